@@ -1,0 +1,100 @@
+"""Where things stand in the arrays that host and kernels share.
+
+The motion of all trains is one array ``motion[row, i]``. A row is a copy of the generalised coordinates, a
+column one coordinate: first the vertical rail blocks of all trains (train, rail, w_1..w_N, theta_y,1..N), then the
+lateral ones (train, rail, v, theta_z, theta_x), the slabs (train, slot, DOF) and the vehicles (train, DOF). The train
+is the outermost index of every block, so each block is a contiguous right-hand side for a matrix product.
+"""
+
+# Rows of ``motion``.
+U, V, A = 0, 1, 2  # displacement, velocity, acceleration: at t_n between steps, the iterate at t_{n+1} within one
+U_PREDICTED, V_PREDICTED = 3, 4  # Newmark predictors of t_{n+1}
+LINEAR = 5  # -(C v + K u) of the linear part at the predictors
+F = 6  # right-hand side of the implicit solve
+X = 7  # its solution: acceleration without the contact forces
+MOTION_ROWS = 8
+
+# Entries of ``dims`` (int32): sizes and offsets.
+(
+    TRAINS,
+    MODES,
+    SEATS,
+    SLOTS,
+    SLAB_DOFS,
+    VEHICLE_DOFS,
+    WHEELSETS,
+    SEATS_PER_SLAB,
+    LATERAL,  # offset of the lateral rail blocks
+    SLABS,  # offset of the slab blocks
+    VEHICLES,  # offset of the vehicle blocks
+    HALF_BAND,
+    BODIES,
+    MORTAR_MODE,  # 0 bed wholly implicit, 1 only its no-tension deviation explicit, 2 wholly explicit
+    CROSS_LEVEL_ROLLS,  # 1: a cross level turns the railheads, 0: it only shifts them
+    N_DIMS,
+) = range(16)
+
+# Entries of ``constants`` (float64).
+(
+    DT,
+    BETA_DT2,  # beta dt^2
+    GAMMA_DT,  # gamma dt
+    HALF_BETA_DT2,  # (1/2 - beta) dt^2
+    HALF_GAMMA_DT,  # (1 - gamma) dt
+    LENGTH,  # window [m]
+    K_VERTICAL,
+    C_VERTICAL,
+    K_LATERAL,
+    C_LATERAL,
+    ARM_FASTENING,  # a
+    HALF_BASE,  # b
+    SPACING,  # seat pitch d
+    ARM_HEAD,  # h_r
+    FRICTION,
+    CROWN_OFFSET,  # y_r
+    IRREGULARITY_HALF_BASE,  # b_i
+    CONTACT_TOLERANCE,  # relative to the static wheel load
+    STATIC_LOAD,
+    TABLE_U0,
+    TABLE_DU,
+    TABLE_ALPHA0,
+    TABLE_DALPHA,
+    N_CONSTANTS,
+) = range(24)
+
+# Columns of ``clock[step, :]`` (float64): the window at t_{n+1}.
+(POSITION, SPEED, SPEED_RATE, FIRST_SEAT_S, FIRST_SEAT, FIRST_SLAB, N_CLOCK) = range(7)
+
+# Entries of ``tick`` (int32): what the launch is to do.
+(STEP, PASS, LAST_PASS, WHEEL_RECORD, BODY_RECORD, N_TICK) = range(6)
+
+# Channels of the irregularity at a wheelset: track values and their slopes along x.
+(Z_V, Y_A, CROSS_LEVEL, GAUGE, Z_V_SLOPE, Y_A_SLOPE, CROSS_LEVEL_SLOPE, GAUGE_SLOPE, N_IRREGULARITY) = range(9)
+
+# Columns of the contact geometry table.
+(GAP, S_WHEEL, S_RAIL, RADIUS, TAN_GAMMA, HERTZ, C11, C22, C23, C33, N_TABLE) = range(11)
+
+# What a wheel puts out; forces of the wheel on the rail in the track frame.
+(
+    NORMAL_FORCE,
+    VERTICAL_FORCE,
+    LATERAL_FORCE,
+    LONGITUDINAL_CREEPAGE,
+    LATERAL_CREEPAGE,
+    SPIN_CREEPAGE,
+    PENETRATION,
+    POSITION_WHEEL,
+    POSITION_RAIL,
+    ROLLING_RADIUS,
+    RAIL_DEFLECTION,
+    LONGITUDINAL_CREEP_FORCE,
+    LATERAL_CREEP_FORCE,
+    SPIN_MOMENT,
+    IRREGULARITY_VERTICAL,
+    IRREGULARITY_LATERAL,
+    RELATIVE_SHIFT,
+    N_WHEEL,
+) = range(18)
+
+# Seat quantities of one rail: displacement and material rate of w, v, theta_x.
+SEAT_W, SEAT_DW, SEAT_V, SEAT_DV, SEAT_ROLL, SEAT_DROLL = range(6)
