@@ -1,0 +1,44 @@
+"""Rail fastenings: parameters, and the tables the kernel gathers and scatters with (MODEL §3)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.quantity import Params, Q
+
+__all__ = ["Fastening", "seat_count", "seat_tables"]
+
+
+class Fastening(Params):
+    """Spring and damper of one rail seat."""
+
+    name: str = "fastening"
+    source: str = ""
+    vertical_stiffness: Annotated[float, Q("N/m", "k_v, both half springs together", gt=0)]
+    lateral_stiffness: Annotated[float, Q("N/m", "k_l", gt=0)]
+    vertical_damping: Annotated[float, Q("N s/m", "c_v", ge=0)]
+    lateral_damping: Annotated[float, Q("N s/m", "c_l", ge=0)]
+
+
+def seat_count(length: float, spacing: float) -> int:
+    """Most seats that a window can hold at once: the first may stand anywhere in (0, d]."""
+    return int(np.ceil(length / spacing - 1e-9)) + 1
+
+
+def seat_tables(modes: int, length: float, spacing: float) -> NDArray[np.float64]:
+    """Constant half of the seats' shape functions.
+
+    Args:
+        modes: Modes N of a field.
+        length: Window l [m].
+        spacing: Seat pitch d [m].
+
+    Returns:
+        cos(k_i j d) for i = 1..N, then sin(k_i j d), with k_i = i pi / l; shape (seats, 2 N).
+    """
+    j = np.arange(seat_count(length, spacing))[:, None]
+    k = np.arange(1, modes + 1) * np.pi / length
+    return np.ascontiguousarray(np.hstack([np.cos(k * j * spacing), np.sin(k * j * spacing)]))
