@@ -1,0 +1,206 @@
+"""One wheel on one rail: geometry table, kinematics, normal force and creep forces (MODEL §5).
+
+Everything here is a pure function of one wheel's motion. Conventions: sigma = -1 left, +1 right; z_c, y_c, x are the
+contact frame's axes, y_c = (cos gamma_t, -sigma sin gamma_t), z_c = (sigma sin gamma_t, cos gamma_t) in (y, z). On the
+wheel: N along -z_c, Fx along x, Fy along y_c, Mz about z_c.
+
+Symbols: p vertical penetration, delta = p cos gamma, u relative outward shift, alpha relative outward tilt, theta the
+cross level at the wheel, D the material rate d/dt - V d/ds of the rail.
+"""
+
+import taichi as ti
+
+from tiengine.kernels import layout as at
+from tiengine.kernels.types import Array
+
+# A wheel's contact state: what geometry and kinematics leave for the law and for the force directions.
+(DELTA, XI_X, XI_Y, XI_S, SIN, COS, S_W, S_R, R_C, KH, K11, K22, K23, K33, SHIFT, Z_IRR, Y_IRR, RAIL_W, N_CONTACT) = range(
+    19
+)
+
+Vector5 = ti.types.vector(5, ti.f64)
+Vector3 = ti.types.vector(3, ti.f64)
+
+
+@ti.func
+def catmull_rom(f: float):
+    """Weights of the four taps around a cell at fraction f in [0, 1]: C1 in the argument."""
+    return 0.5 * ti.Vector(
+        [
+            f * (f * (2.0 - f) - 1.0),
+            f * f * (3.0 * f - 5.0) + 2.0,
+            f * (f * (4.0 - 3.0 * f) + 1.0),
+            f * f * (f - 1.0),
+        ]
+    )
+
+
+@ti.func
+def lookup(u: float, alpha: float, table: Array, constants: Array):
+    """All columns of the contact table at (u, alpha); outside the table its edge cells are continued flat."""
+    x = (u - constants[at.TABLE_U0]) / constants[at.TABLE_DU]
+    y = (alpha - constants[at.TABLE_ALPHA0]) / constants[at.TABLE_DALPHA]
+    i = ti.min(ti.max(ti.cast(ti.floor(x), ti.i32), 1), table.shape[0] - 3)
+    j = ti.min(ti.max(ti.cast(ti.floor(y), ti.i32), 1), table.shape[1] - 3)
+    wx = catmull_rom(ti.min(ti.max(x - i, 0.0), 1.0))
+    wy = catmull_rom(ti.min(ti.max(y - j, 0.0), 1.0))
+    value = ti.Vector.zero(ti.f64, at.N_TABLE)
+    for m in ti.static(range(4)):
+        for n in ti.static(range(4)):
+            weight = wx[m] * wy[n]
+            for column in ti.static(range(at.N_TABLE)):
+                value[column] += weight * table[i + m - 1, j + n - 1, column]
+    return value
+
+
+@ti.func
+def contact_state(
+    sigma: float,
+    V: float,
+    r0: float,
+    b0: float,
+    x: Vector5,
+    dx: Vector5,
+    rail: Vector3,
+    rail_slope: Vector3,
+    rail_rate: Vector3,
+    irregularity: ti.template(),
+    rolls: int,
+    table: Array,
+    constants: Array,
+):
+    """Penetration, creepages and geometry of one wheel.
+
+    Args:
+        sigma: Side.
+        V: Speed [m/s].
+        r0: Nominal rolling radius [m].
+        b0: Half spacing of the tape circles [m].
+        x: Wheelset y, z, roll, pitch, yaw [m, rad].
+        dx: Its rates.
+        rail: w, v, theta_x of the rail under the wheel [m, m, rad].
+        rail_slope: Their d/ds.
+        rail_rate: Their rates at constant s.
+        irregularity: Track channels at the wheelset, see ``layout``.
+        rolls: 1 if a cross level turns the railheads.
+        table: Contact geometry, shape (n_u, n_alpha, N_TABLE).
+        constants: Numbers, see ``layout``.
+    """
+    h_r, b_i, y_r = constants[at.ARM_HEAD], constants[at.IRREGULARITY_HALF_BASE], constants[at.CROWN_OFFSET]
+    w, v, theta_x = rail[0], rail[1], rail[2]
+    turn = irregularity[at.CROSS_LEVEL] * rolls
+    turn_slope = irregularity[at.CROSS_LEVEL_SLOPE] * rolls
+    z_irr = irregularity[at.Z_V] + sigma * b_i * irregularity[at.CROSS_LEVEL]
+    z_slope = irregularity[at.Z_V_SLOPE] + sigma * b_i * irregularity[at.CROSS_LEVEL_SLOPE]
+    y_irr = irregularity[at.Y_A] + sigma * 0.5 * irregularity[at.GAUGE]
+    y_slope = irregularity[at.Y_A_SLOPE] + sigma * 0.5 * irregularity[at.GAUGE_SLOPE]
+
+    u = sigma * ((x[0] - r0 * x[2]) - (v + h_r * theta_x + y_irr))
+    alpha = sigma * (x[2] - theta_x - turn)
+    g = lookup(u, alpha, table, constants)
+    gamma = ti.atan2(g[at.TAN_GAMMA], 1.0)
+    gamma_t = gamma - sigma * (theta_x + turn)
+    c, s = ti.cos(gamma_t), ti.sin(gamma_t)
+    s_w, s_r, r_c = g[at.S_WHEEL], g[at.S_RAIL], g[at.RADIUS]
+    h_c = h_r - (r_c - r0)
+    p = (
+        x[1]
+        + sigma * b0 * x[2]
+        - (w + z_irr + sigma * (b0 - y_r + u) * theta_x + sigma * (b0 - b_i + u) * turn)
+        - g[at.GAP]
+    )
+
+    # Across, the rail head's material velocity counts. Down, a wheel that follows the rail's shape rolls on it.
+    across = dx[0] - V * x[4] - dx[2] * r_c - (rail_rate[1] - V * rail_slope[1]) - h_c * (rail_rate[2] - V * rail_slope[2])
+    advance = V * (s / c) * (x[4] - rail_slope[1] - h_c * rail_slope[2] - y_slope)
+    down = (
+        dx[1]
+        + sigma * (b0 + s_w) * dx[2]
+        - (rail_rate[0] + sigma * s_r * rail_rate[2])
+        - V * (z_slope + sigma * (b0 - b_i + u) * turn_slope)
+        + sigma * advance
+    )
+    xi_x = (V * (1.0 - r_c / r0) + dx[3] * r_c - sigma * (b0 + s_w) * dx[4]) / V
+    xi_y = (across * c - sigma * down * s) / V
+    xi_s = (-sigma * (V / r0) * ti.sin(gamma + alpha) + dx[4] * c) / V
+    return ti.Vector(
+        [p * ti.cos(gamma), xi_x, xi_y, xi_s, s, c, s_w, s_r, r_c]
+        + [g[at.HERTZ], g[at.C11], g[at.C22], g[at.C23], g[at.C33], u, z_irr, y_irr, w]
+    )
+
+
+@ti.func
+def saturation(tau: float):
+    """Shen-Hedrick-Elkins: (T'/T, d(T'/T)/dtau) at tau = T / (mu N); C1 at tau = 3."""
+    factor = 1.0 - tau / 3.0 + tau * tau / 27.0
+    slope = -1.0 / 3.0 + 2.0 * tau / 27.0
+    if tau > 3.0:
+        factor = 1.0 / tau
+        slope = -1.0 / (tau * tau)
+    return ti.Vector([factor, slope])
+
+
+@ti.func
+def contact_law(state: ti.template(), friction: float):
+    """Forces (N, Fx, Fy, Mz) on the wheel in the contact frame, and their derivatives by (delta, xi_x, xi_y, xi_s).
+
+    Hertz N = K delta^1.5 (wheel lift: zero); linear creep forces f11 = c11 N^(2/3), f22 = c22 N^(2/3), f23 = c23 N,
+    f33 = c33 N^(4/3); Shen-Hedrick-Elkins saturation; the spin moment scales with T'/T.
+    """
+    force = ti.Vector([0.0, 0.0, 0.0, 0.0])
+    D = ti.Matrix.zero(ti.f64, 4, 4)
+    delta = state[DELTA]
+    if delta > 0.0:
+        N = state[KH] * delta * ti.sqrt(delta)
+        third = ti.pow(N, 1.0 / 3.0)
+        f11, f22 = state[K11] * third * third, state[K22] * third * third
+        f23, f33 = state[K23] * N, state[K33] * N * third
+        xi_x, xi_y, xi_s = state[XI_X], state[XI_Y], state[XI_S]
+        Tx, Ty, Mz = -f11 * xi_x, -f22 * xi_y - f23 * xi_s, f23 * xi_y - f33 * xi_s
+        T = ti.sqrt(Tx * Tx + Ty * Ty) + 1e-12 * N  # keeps d tau finite at rest
+        tau = T / (friction * N)
+        e = saturation(tau)
+        force = ti.Vector([N, e[0] * Tx, e[0] * Ty, e[0] * Mz])
+
+        # Columns: derivatives of the linear forces by N (through delta) and by the three creepages.
+        dN = 1.5 * N / delta
+        dTx = ti.Vector([2.0 / 3.0 * Tx / N * dN, -f11, 0.0, 0.0])
+        dTy = ti.Vector([(-2.0 / 3.0 * f22 * xi_y - f23 * xi_s) / N * dN, 0.0, -f22, -f23])
+        dMz = ti.Vector([(f23 * xi_y - 4.0 / 3.0 * f33 * xi_s) / N * dN, 0.0, f23, -f33])
+        for m in ti.static(range(4)):
+            dtau = (Tx * dTx[m] + Ty * dTy[m]) / (T * friction * N)
+            if ti.static(m == 0):
+                dtau -= tau / N * dN
+                D[0, 0] = dN
+            D[1, m] = e[0] * dTx[m] + Tx * e[1] * dtau
+            D[2, m] = e[0] * dTy[m] + Ty * e[1] * dtau
+            D[3, m] = e[0] * dMz[m] + Mz * e[1] * dtau
+    return force, D
+
+
+@ti.func
+def force_directions(sigma: float, r0: float, b0: float, h_r: float, state: ti.template()):
+    """Generalised forces of unit (N, Fx, Fy, Mz): on the wheelset (5, 4) and on the rail's w, v, theta_x (3, 4).
+
+    The arms are those of the actual contact point: (sigma (b0 + s_w), r_c) on the wheelset, (sigma s_r, -h_c) on the rail.
+    """
+    s, c = state[SIN], state[COS]
+    arm, r, s_r = b0 + state[S_W], state[R_C], state[S_R]
+    h_c = h_r - (r - r0)
+    wheelset = ti.Matrix(
+        [
+            [-sigma * s, 0.0, c, 0.0],
+            [-c, 0.0, -sigma * s, 0.0],
+            [-sigma * (arm * c - r * s), 0.0, -arm * s - r * c, 0.0],
+            [0.0, r, 0.0, sigma * s],
+            [0.0, -sigma * arm, 0.0, c],
+        ]
+    )
+    rail = ti.Matrix(
+        [
+            [c, 0.0, sigma * s, 0.0],
+            [sigma * s, 0.0, -c, 0.0],
+            [sigma * (s_r * c + h_c * s), 0.0, s_r * s - h_c * c, 0.0],
+        ]
+    )
+    return wheelset, rail
