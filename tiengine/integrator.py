@@ -1,0 +1,182 @@
+r"""The implicit half: Newmark's average acceleration on constant blocks, factorised once.
+
+The semi-discrete equations M a + C v + K u = f(u, v, t) are advanced with (Newmark 1959; predictor form of Hughes and
+Liu 1978)
+
+    u~ = u_n + dt v_n + (1/2 - beta) dt^2 a_n        u_{n+1} = u~ + beta dt^2 a_{n+1}
+    v~ = v_n + (1 - gamma) dt a_n                    v_{n+1} = v~ + gamma dt a_{n+1}
+    A a^{k+1} = -(C v~ + K u~) + f(u^k, v^k, t_{n+1}) + A_s a^k,   A = M + gamma dt C + beta dt^2 K + A_s
+
+k = 0, 1, ... passes from a^0 = 0. Everything that moves or is nonlinear is in f, evaluated by the kernels at the
+iterate. A_s = beta dt^2 K_s + gamma dt C_s is a constant stand-in for the part of f that would make the iteration
+diverge: fastenings smeared along the rail. It drops out as the passes converge. With beta = 1/4, gamma = 1/2 the
+method is of second order; two passes keep that order, because the first leaves an error of order dt^2 in a.
+
+| symbol | meaning |
+|---|---|
+| M, C, K | mass, damping and convection, stiffness of the linear constant part |
+| f | fastenings, nonlinear suspension, mortar without tension, gravity, contact |
+| A^-1 | explicit inverse: at these sizes a dense product beats a sparse triangular solve five times |
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from tiengine.fastening import Fastening
+from tiengine.quantity import InputError
+from tiengine.rail import RailWindow
+
+__all__ = ["Newmark", "inverse", "rail_inverses", "seat_inverse_terms", "slab_operator"]
+
+INVERSE_TOLERANCE = 1e-7  # ||A A^-1 - I||: an ill-conditioned block (cond 1e9) is refused
+
+
+@dataclass(frozen=True)
+class Newmark:
+    """Step and coefficients.
+
+    Attributes:
+        dt: Time step [s].
+        beta: Newmark's beta.
+        gamma: Newmark's gamma.
+    """
+
+    dt: float
+    beta: float = 0.25
+    gamma: float = 0.5
+
+    @property
+    def beta_dt2(self) -> float:
+        """Beta dt^2 [s^2]: end-of-step displacement per unit acceleration."""
+        return self.beta * self.dt**2
+
+    @property
+    def gamma_dt(self) -> float:
+        """Gamma dt [s]: end-of-step velocity per unit acceleration."""
+        return self.gamma * self.dt
+
+    def operator(self, M: sp.sparray, C: sp.sparray, K: sp.sparray) -> sp.csc_array:
+        """M + gamma dt C + beta dt^2 K."""
+        return sp.csc_array(M + self.gamma_dt * C + self.beta_dt2 * K)
+
+
+def inverse(A: sp.csc_array, name: str) -> NDArray[np.float64]:
+    """Explicit inverse of a block by sparse LU, checked.
+
+    Args:
+        A: Square operator, shape (n, n).
+        name: Name of the block for the error.
+
+    Returns:
+        A^-1, dense, shape (n, n).
+
+    Raises:
+        InputError: The block is singular or too ill-conditioned for an explicit inverse.
+    """
+    try:
+        result: NDArray[np.float64] = splu(sp.csc_array(A)).solve(np.eye(A.shape[0]))
+    except RuntimeError as error:
+        raise InputError(f"{name} block: singular ({error}); a mass or stiffness is missing") from error
+    miss = float(np.abs(A @ result - np.eye(A.shape[0])).max())
+    if not miss < INVERSE_TOLERANCE:
+        raise InputError(f"{name} block: residual of its inverse {miss:.1e} must be below {INVERSE_TOLERANCE:g}")
+    return result
+
+
+def rail_inverses(
+    window: RailWindow, fastening: Fastening, spacing: float, newmark: Newmark, V: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Inverses of the vertical (2N, 2N) and lateral (3N, 3N) rail blocks at speed V, smeared fastenings included.
+
+    Args:
+        window: The rail.
+        fastening: Its fastenings.
+        spacing: Seat pitch d [m].
+        newmark: Step and coefficients.
+        V: Speed [m/s].
+    """
+    n, per_mode = window.modes, window.length / (2.0 * spacing)
+    kv = per_mode * (newmark.beta_dt2 * fastening.vertical_stiffness + newmark.gamma_dt * fastening.vertical_damping)
+    kl = per_mode * (newmark.beta_dt2 * fastening.lateral_stiffness + newmark.gamma_dt * fastening.lateral_damping)
+    a, b = window.rail.arm_fastening, window.rail.half_base
+    one, none = sp.eye_array(n), sp.csr_array((n, n))
+    smeared_vertical = sp.block_diag([kv * one, none])
+    smeared_lateral = sp.block_array(
+        [[kl * one, None, -a * kl * one], [None, none, None], [-a * kl * one, None, (a**2 * kl + b**2 * kv) * one]]
+    )
+    return (
+        inverse(newmark.operator(*window.vertical(V)) + smeared_vertical, "vertical rail"),
+        inverse(newmark.operator(*window.lateral(V)) + smeared_lateral, "lateral rail"),
+    )
+
+
+def seat_inverse_terms(
+    n: int,
+    index: NDArray[np.int32],
+    shape: NDArray[np.float64],
+    x: NDArray[np.float64],
+    scale: NDArray[np.float64],
+    fastening: Fastening,
+    half_base: float,
+) -> tuple[sp.csr_array, sp.csr_array]:
+    """Stiffness and damping of a slab's own motion against its fastenings.
+
+    Args:
+        n: DOFs of the slab; the last two are lateral displacement and yaw.
+        index: Plate DOFs under each seat, shape (seats, 2, 12).
+        shape: w and dw/dy there, shape (2, seats, 2, 12).
+        x: Seats from the slab's centre [m], shape (seats,).
+        scale: Factor of each fastening, shape (seats, 2).
+        fastening: Their sound values.
+        half_base: b [m].
+
+    Returns:
+        K and C, shape (n, n).
+    """
+    K, C = np.zeros((n, n)), np.zeros((n, n))
+    for seat in range(len(x)):
+        lateral = np.zeros(n)
+        lateral[-2:] = 1.0, x[seat]
+        for side in range(2):
+            w, slope = np.zeros(n), np.zeros(n)
+            w[index[seat, side]] = shape[0, seat, side]
+            slope[index[seat, side]] = shape[1, seat, side]
+            vertical = np.outer(w, w) + half_base**2 * np.outer(slope, slope)
+            across = np.outer(lateral, lateral)
+            K += scale[seat, side] * (
+                fastening.vertical_stiffness * vertical + fastening.lateral_stiffness * across
+            )
+            C += scale[seat, side] * (fastening.vertical_damping * vertical + fastening.lateral_damping * across)
+    return sp.csr_array(K), sp.csr_array(C)
+
+
+def slab_operator(
+    K: NDArray[np.float64], C: NDArray[np.float64], half_band: int
+) -> NDArray[np.float64]:
+    """K and C by diagonals, the layout of the slab kernel.
+
+    Args:
+        K: Stiffness, shape (n, n).
+        C: Damping, shape (n, n).
+        half_band: Diagonals beside the main one.
+
+    Returns:
+        Entry [0 or 1, i, j - i + half_band], shape (2, n, 2 half_band + 1).
+
+    Raises:
+        ValueError: An entry lies outside the band.
+    """
+    n = len(K)
+    band = np.zeros((2, n, 2 * half_band + 1))
+    for kind, matrix in enumerate((K, C)):
+        rows, columns = np.nonzero(matrix)
+        if np.any(np.abs(rows - columns) > half_band):
+            raise ValueError("slab matrix has entries outside its band")
+        band[kind, rows, columns - rows + half_band] = matrix[rows, columns]
+    return band

@@ -1,0 +1,277 @@
+"""The constant data of a group of trains that are advanced together.
+
+All trains of a group run the same window along the same track at the same speed; they differ in their realisation
+of the irregularity. Arrays have the shapes that the kernels of :mod:`tiengine.kernels.step` read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from tiengine.blocks import Blocks
+from tiengine.contact_geometry import ContactTable
+from tiengine.fastening import Fastening, seat_count, seat_tables
+from tiengine.integrator import Newmark, inverse, seat_inverse_terms, slab_operator
+from tiengine.irregularity import HALF_BASE
+from tiengine.kernels import layout as at
+from tiengine.mortar import Mortar
+from tiengine.rail import Rail, RailWindow, sine_products
+from tiengine.slab import Slab, SlabMatrices
+from tiengine.train import TrainModel, static_wheel_loads
+
+__all__ = ["Ingredients", "Model", "SlabDesigns", "build_model"]
+
+CONTACT_TOLERANCE = 1e-6  # of the static wheel load: below single precision of the recorded forces
+
+
+@dataclass(frozen=True)
+class SlabDesigns:
+    """The different slabs of a track: sound ones, and those with voids or failed fastenings.
+
+    Attributes:
+        matrices: Matrices of each design, the sound one first.
+        seat_scale: Factors of the fastenings on each, shape (designs, seats per slab, 2).
+        of_slab: Design of the slabs (by index along the track) that are not sound.
+    """
+
+    matrices: tuple[SlabMatrices, ...]
+    seat_scale: NDArray[np.float64]
+    of_slab: Mapping[int, int]
+
+
+@dataclass(frozen=True)
+class Ingredients:
+    """What a model is made from.
+
+    Attributes:
+        rail: Rail section, the same left and right.
+        fastening: Sound fastening.
+        seat_factors: Factors of seats first..first+count-1, shape (count, 2).
+        slab: Slab.
+        mortar: Its bed.
+        designs: The different slabs.
+        train: Vehicles.
+        contact: Contact geometry of wheel and rail.
+        friction: Coefficient of friction.
+        cross_level_rolls: Whether a cross level turns the railheads.
+        length: Window l [m].
+        modes: N.
+        newmark: Step and coefficients.
+        passes: Passes a step.
+        cover: Enough slabs for every seat of the window, or the paper's count.
+        explicit_mortar: The bed in the explicit half.
+        trains: Trains advanced together.
+    """
+
+    rail: Rail
+    fastening: Fastening
+    seat_factors: Callable[[int, int], NDArray[np.float64]]
+    slab: Slab
+    mortar: Mortar
+    designs: SlabDesigns
+    train: TrainModel
+    contact: ContactTable
+    friction: float
+    cross_level_rolls: bool
+    length: float
+    modes: int
+    newmark: Newmark
+    passes: int = 2
+    cover: bool = True
+    explicit_mortar: bool = False
+    trains: int = 1
+
+    @property
+    def slots(self) -> int:
+        """Slabs in memory: the paper's Eq. (16), or one more, since a moving window can touch that many."""
+        return int(np.floor(self.length / self.slab.pitch)) + (2 if self.cover else 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Constant arrays of the step.
+
+    Attributes:
+        given: What the model was made from.
+        window: Rail matrices.
+        wheel_s: Wheels in the window [m], shape (W,).
+        centre_s: Centre of the first vehicle in the window [m].
+        dims: Sizes and offsets (``layout``).
+        constants: Numbers (``layout``).
+        stiffness, mass, G: Rail coefficients, shapes (N, 8), (5,), (2, N, N).
+        gather_table, scatter_table: Seat tables, shapes (seats, 2N), (2N, seats).
+        seat_index, seat_shape, seat_x: Slab under the seats, shapes (n, 2, 12), (2, n, 2, 12), (n,).
+        band: Slab operators, shape (designs, 2, dofs, 2 half_band + 1).
+        slab_inverse: Inverses of the slab blocks, transposed, shape (designs, dofs, dofs).
+        bed_index, bed_shape, bed_weight: Quadrature of the bed.
+        bed_factor, bed_rest: Factors and pressures at rest by design.
+        bed_lateral_K, bed_lateral_C: Lateral bed by design, shape (designs, 2, 2).
+        bed_numbers: k_m, c_m, explicit, no tension.
+        vehicle_load: Gravity, and force per unit rate of speed, shape (2, n).
+        wheel: r0, b0, spin inertia, shape (W, 3).
+        wheel_shape: sin(k_i s) and its slope under the wheels, shape (2, W, N).
+        blocks: Inverses that depend on the speed.
+    """
+
+    given: Ingredients
+    window: RailWindow
+    wheel_s: NDArray[np.float64]
+    centre_s: float
+    dims: NDArray[np.int32]
+    constants: NDArray[np.float64]
+    stiffness: NDArray[np.float64]
+    mass: NDArray[np.float64]
+    G: NDArray[np.float64]
+    gather_table: NDArray[np.float64]
+    scatter_table: NDArray[np.float64]
+    seat_index: NDArray[np.int32]
+    seat_shape: NDArray[np.float64]
+    seat_x: NDArray[np.float64]
+    band: NDArray[np.float64]
+    slab_inverse: NDArray[np.float64]
+    bed_index: NDArray[np.int32]
+    bed_shape: NDArray[np.float64]
+    bed_weight: NDArray[np.float64]
+    bed_factor: NDArray[np.float64]
+    bed_rest: NDArray[np.float64]
+    bed_lateral_K: NDArray[np.float64]
+    bed_lateral_C: NDArray[np.float64]
+    bed_numbers: NDArray[np.float64]
+    vehicle_load: NDArray[np.float64]
+    wheel: NDArray[np.float64]
+    wheel_shape: NDArray[np.float64]
+    blocks: Blocks
+
+    @property
+    def dof_counts(self) -> dict[str, int]:
+        """Degrees of freedom of one train: vehicles (internal states apart), rails, slabs, all."""
+        g = self.given
+        vehicles, rails = g.train.n_dof, 2 * 5 * g.modes
+        slabs = g.slots * int(self.dims[at.SLAB_DOFS])
+        return {
+            "vehicles": vehicles,
+            "rails": rails,
+            "slabs": slabs,
+            "total": vehicles + rails + slabs,
+            "internal_states": g.train.n - g.train.n_dof,
+        }
+
+    def refactor(self, V: float) -> None:
+        """Fill the blocks that depend on the speed V [m/s]."""
+        g = self.given
+        self.blocks.fill(
+            self.window, g.fastening, g.slab.fastening_pitch, g.train, g.newmark, V, self.wheel_shape
+        )
+
+
+def build_model(given: Ingredients, V: float) -> Model:
+    """Assemble and factorise everything for a speed V [m/s]."""
+    window = RailWindow(given.rail, given.length, given.modes)
+    train = given.train
+    middle = 0.5 * (train.wheelset_x.max() + train.wheelset_x.min())
+    centre_s = given.length / 2.0 - middle
+    wheel_s = centre_s + train.wheelset_x
+    first = given.designs.matrices[0]
+    table = seat_tables(given.modes, given.length, given.slab.fastening_pitch)
+    model = Model(
+        given=given,
+        window=window,
+        wheel_s=wheel_s,
+        centre_s=float(centre_s),
+        dims=_dims(given, first),
+        constants=_constants(given),
+        stiffness=window.modal_stiffness,
+        mass=window.modal_masses,
+        G=sine_products(given.modes),
+        gather_table=table,
+        scatter_table=np.ascontiguousarray(table.T),
+        seat_index=first.seat_index,
+        seat_shape=np.stack([first.seat_w, first.seat_slope]),
+        seat_x=first.seat_x,
+        **_slab_arrays(given),
+        vehicle_load=np.stack([train.gravity, train.acceleration_force]),
+        wheel=np.stack([train.wheel_radius, train.half_spacing, train.wheelset_spin_inertia], axis=1),
+        wheel_shape=np.stack([window.shape(wheel_s), window.shape_slope(wheel_s)]),
+        blocks=Blocks.empty(given.modes, len(wheel_s), train.n),
+    )
+    model.refactor(V)
+    return model
+
+
+def _dims(given: Ingredients, first: SlabMatrices) -> NDArray[np.int32]:
+    """Sizes and offsets, see ``layout``."""
+    dims = np.zeros(at.N_DIMS, dtype=np.int32)
+    n, B = given.modes, given.trains
+    explicit, no_tension = given.explicit_mortar, given.mortar.no_tension
+    dims[at.TRAINS], dims[at.MODES], dims[at.SLOTS], dims[at.SLAB_DOFS] = B, n, given.slots, first.n
+    dims[at.SEATS] = seat_count(given.length, given.slab.fastening_pitch)
+    dims[at.VEHICLE_DOFS], dims[at.WHEELSETS] = given.train.n, len(given.train.wheelset_x)
+    dims[at.SEATS_PER_SLAB] = given.slab.fastenings
+    dims[at.LATERAL] = B * 4 * n
+    dims[at.SLABS] = B * 10 * n
+    dims[at.VEHICLES] = B * (10 * n + given.slots * first.n)
+    dims[at.HALF_BAND] = first.half_band
+    dims[at.BODIES] = len(given.train.body_names)
+    dims[at.MORTAR_MODE] = 2 if explicit else 1 if no_tension else 0
+    dims[at.CROSS_LEVEL_ROLLS] = int(given.cross_level_rolls)
+    return dims
+
+
+def _constants(given: Ingredients) -> NDArray[np.float64]:
+    """Numbers, see ``layout``."""
+    c = np.zeros(at.N_CONSTANTS)
+    newmark, fastening, rail, table = given.newmark, given.fastening, given.rail, given.contact
+    dt = newmark.dt
+    c[at.DT], c[at.BETA_DT2], c[at.GAMMA_DT] = dt, newmark.beta_dt2, newmark.gamma_dt
+    c[at.HALF_BETA_DT2], c[at.HALF_GAMMA_DT] = (0.5 - newmark.beta) * dt**2, (1.0 - newmark.gamma) * dt
+    c[at.LENGTH], c[at.SPACING] = given.length, given.slab.fastening_pitch
+    c[at.K_VERTICAL], c[at.C_VERTICAL] = fastening.vertical_stiffness, fastening.vertical_damping
+    c[at.K_LATERAL], c[at.C_LATERAL] = fastening.lateral_stiffness, fastening.lateral_damping
+    c[at.ARM_FASTENING], c[at.HALF_BASE], c[at.ARM_HEAD] = rail.arm_fastening, rail.half_base, rail.arm_head
+    c[at.FRICTION], c[at.CROWN_OFFSET] = given.friction, table.crown_offset
+    c[at.IRREGULARITY_HALF_BASE], c[at.CONTACT_TOLERANCE] = HALF_BASE, CONTACT_TOLERANCE
+    c[at.STATIC_LOAD] = float(np.max(static_wheel_loads(given.train)))
+    c[at.TABLE_U0], c[at.TABLE_DU] = table.u_min, table.du
+    c[at.TABLE_ALPHA0], c[at.TABLE_DALPHA] = table.alpha_min, table.dalpha
+    return c
+
+
+def _slab_arrays(given: Ingredients) -> dict[str, NDArray[np.float64] | NDArray[np.int32]]:
+    """Operators, inverses and bed tables of every slab design."""
+    designs, mortar = given.designs.matrices, given.mortar
+    band, inverses = [], []
+    for slab, scale in zip(designs, given.designs.seat_scale, strict=True):
+        K = slab.K_plate if given.explicit_mortar else slab.K_plate + slab.K_bed
+        C = np.zeros_like(K) if given.explicit_mortar else slab.C_bed
+        own_K, own_C = seat_inverse_terms(
+            slab.n,
+            slab.seat_index,
+            np.stack([slab.seat_w, slab.seat_slope]),
+            slab.seat_x,
+            scale,
+            given.fastening,
+            given.rail.half_base,
+        )
+        A = given.newmark.operator(sp.csr_array(slab.M), sp.csr_array(C) + own_C, sp.csr_array(K) + own_K)
+        inverses.append(inverse(A, "slab").T)
+        band.append(slab_operator(K, C, slab.half_band))
+    first = designs[0]
+    return {
+        "band": np.stack(band),
+        "slab_inverse": np.stack(inverses),
+        "bed_index": first.bed_index,
+        "bed_shape": first.bed_shape,
+        "bed_weight": first.bed_weight,
+        "bed_factor": np.stack([slab.bed_factor for slab in designs]),
+        "bed_rest": np.stack([slab.bed_weight_pressure for slab in designs]),
+        "bed_lateral_K": np.stack([slab.K_bed[-2:, -2:] for slab in designs]),
+        "bed_lateral_C": np.stack([slab.C_bed[-2:, -2:] for slab in designs]),
+        "bed_numbers": np.array(
+            [mortar.stiffness, mortar.damping, float(given.explicit_mortar), float(mortar.no_tension)]
+        ),
+    }

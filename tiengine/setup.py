@@ -1,0 +1,105 @@
+"""From a scenario to what the model is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.contact_geometry import ContactSettings, ContactTable, build_contact_table
+from tiengine.defects import fastening_factors
+from tiengine.integrator import Newmark
+from tiengine.model import Ingredients, SlabDesigns
+from tiengine.mortar import MortarVoid
+from tiengine.quantity import InputError
+from tiengine.scenario import Scenario
+from tiengine.slab import slab_designs
+from tiengine.train import TrainModel, assemble
+
+__all__ = ["ingredients"]
+
+
+def ingredients(scenario: Scenario, dt: float) -> Ingredients:
+    """Everything a model needs, built from the scenario's parts.
+
+    Args:
+        scenario: Checked scenario.
+        dt: Time step [s].
+
+    Raises:
+        InputError: Parts that do not go together.
+    """
+    parts, numerics = scenario.parts, scenario.numerics
+    train = assemble(parts.vehicles, parts.centres, series_springs=scenario.train.series_springs)
+    return Ingredients(
+        rail=parts.rail,
+        fastening=parts.fastening,
+        seat_factors=_seat_factors(scenario),
+        slab=parts.slab,
+        mortar=parts.mortar,
+        designs=_designs(scenario),
+        train=train,
+        contact=_contact(scenario, train),
+        friction=scenario.track.friction,
+        cross_level_rolls=scenario.contact.cross_level_rolls_rails,
+        length=scenario.window_length,
+        modes=scenario.modes,
+        newmark=Newmark(dt),
+        passes=numerics.passes,
+        cover=numerics.slab_count == "cover",
+        explicit_mortar=numerics.mortar == "explicit",
+    )
+
+
+def _contact(scenario: Scenario, train: TrainModel) -> ContactTable:
+    """Contact table of the train's wheels on the rail; one kind of wheel in a train."""
+    parts, track = scenario.parts, scenario.track
+    for what, values in (("wheel_radius", train.wheel_radius), ("half_span_contact", train.half_spacing)):
+        if np.ptp(values) > 0.0:
+            raise InputError(
+                f"train.vehicles: {what} is {values.min():g} and {values.max():g} m;"
+                " vehicles of one train must agree, they share a contact table"
+            )
+    settings = ContactSettings(
+        gauge=track.gauge,
+        gauge_depth=track.gauge_depth,
+        cant=track.cant,
+        half_spacing=float(train.half_spacing[0]),
+        wheel_radius=float(train.wheel_radius[0]),
+        E=parts.rail.E,
+        nu=parts.rail.nu,
+        hertz=scenario.contact.hertz,
+        smoothing=scenario.contact.smoothing,
+    )
+    return build_contact_table(parts.wheel, parts.rail_profile, settings)
+
+
+def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64]]:
+    """Factors of a row of seats."""
+    failed = scenario.track.failed_fastenings
+    return lambda first, count: fastening_factors(failed, first, count)
+
+
+def _designs(scenario: Scenario) -> SlabDesigns:
+    """One design for each slab that has a void or a failed fastening, besides the sound one."""
+    parts, track = scenario.parts, scenario.track
+    voids = [
+        MortarVoid(
+            slab=void.slab, x_from=void.x[0], x_to=void.x[1], y_from=void.y[0], y_to=void.y[1], factor=void.factor
+        )
+        for void in track.mortar_voids
+    ]
+    matrices, of_void = slab_designs(parts.slab, parts.mortar, voids)
+    per_slab = parts.slab.fastenings
+    damaged = set(of_void)
+    for row in track.failed_fastenings:
+        damaged.update(range(row.seats[0] // per_slab, row.seats[1] // per_slab + 1))
+    order = sorted(damaged)
+    sound = np.ones((per_slab, 2))
+    scales = [fastening_factors(track.failed_fastenings, slab * per_slab, per_slab) for slab in order]
+    return SlabDesigns(
+        matrices=(matrices[0], *(matrices[of_void.get(slab, 0)] for slab in order)),
+        seat_scale=np.stack([sound, *scales]),
+        of_slab={slab: i + 1 for i, slab in enumerate(order)},
+    )

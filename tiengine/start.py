@@ -1,0 +1,205 @@
+"""Start from steady rolling at speed V over the seats as they stand at t = 0 (MODEL §7).
+
+With d/dt = 0 everywhere but for the wheelsets' spin, the track is linear: the rails' motion under the wheels follows
+from the contact forces by a constant compliance. Unknowns are the train's coordinates (a wheelset's pitch is replaced
+by its rate, such that its driving moment vanishes) and the generalised contact forces on the rails. Newton's method
+takes the contact's derivatives by differences, all of them in one launch over as many perturbed trains.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.kernels import contact as kernels
+from tiengine.kernels import layout as at
+from tiengine.kernels.wheel_rail import N_CONTACT
+from tiengine.model import Model
+from tiengine.quantity import InputError
+from tiengine.state import State, positions
+from tiengine.track_static import StaticTrack
+
+__all__ = ["ContactForces", "equilibrium", "evaluate_contact"]
+
+NEWTON = 60
+FORCE_TOLERANCE = 1e-4  # N: a billionth of a wheel load
+NUDGE_COORDINATE = 1e-8  # m, rad
+NUDGE_RATE = 1e-6  # rad/s
+NUDGE_FORCE = 1.0  # N
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForces:
+    """What the contact kernel returns; B trains, W wheelsets.
+
+    Attributes:
+        contact: Contact states, shape (B, W, 2, N_CONTACT).
+        local: N, Fx, Fy, Mz on the wheels, shape (B, W, 2, 4).
+        wheelset: Forces on y, z, roll, pitch, yaw, shape (B, W, 5).
+        rail: Forces on w, v, theta_x, shape (B, W, 2, 3).
+    """
+
+    contact: NDArray[np.float64]
+    local: NDArray[np.float64]
+    wheelset: NDArray[np.float64]
+    rail: NDArray[np.float64]
+
+
+def evaluate_contact(
+    model: Model,
+    V: float,
+    irregularity: NDArray[np.float64],
+    wheelset_u: NDArray[np.float64],
+    wheelset_v: NDArray[np.float64],
+    rail_motion: NDArray[np.float64],
+) -> ContactForces:
+    """Contact forces at given motions, for any number of trains.
+
+    Args:
+        model: Contact table and numbers.
+        V: Speed [m/s].
+        irregularity: Track channels, shape (B, W, N_IRREGULARITY).
+        wheelset_u: y, z, roll, pitch, yaw, shape (B, W, 5).
+        wheelset_v: Their rates.
+        rail_motion: w, v, theta_x, slopes, rates at constant s, shape (B, W, 2, 9).
+    """
+    B, W = wheelset_u.shape[:2]
+    out = ContactForces(
+        np.zeros((B, W, 2, N_CONTACT)), np.zeros((B, W, 2, 4)), np.zeros((B, W, 5)), np.zeros((B, W, 2, 3))
+    )
+    kernels.wheel_forces(
+        V,
+        int(model.dims[at.CROSS_LEVEL_ROLLS]),
+        model.constants,
+        model.given.contact.values,
+        model.wheel,
+        np.ascontiguousarray(np.broadcast_to(irregularity, (B, W, at.N_IRREGULARITY))),
+        np.ascontiguousarray(wheelset_u),
+        np.ascontiguousarray(wheelset_v),
+        np.ascontiguousarray(rail_motion),
+        out.contact,
+        out.local,
+        out.wheelset,
+        out.rail,
+    )
+    return out
+
+
+def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 0.0) -> None:
+    """Put all trains of a state into steady rolling on a smooth track.
+
+    Args:
+        model: Constant data.
+        state: Written: rows U, V, A, the contact's forces, the slabs under the window.
+        X: Chainage of the window's rear end [m].
+        V: Speed [m/s].
+        V_rate: Its rate [m/s^2].
+
+    Raises:
+        InputError: Newton's method found no equilibrium.
+    """
+    clock = positions(model, np.array([X]), np.array([V]), np.array([V_rate])).clock[0]
+    state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
+    track = StaticTrack(model, state, float(clock[at.FIRST_SEAT_S]), V)
+    problem = _Problem(model, track, V, V_rate)
+    y = problem.solve()
+    x, rates, rail_force = problem.split(y[None])
+    rails, slabs = track.motion(rail_force[0])
+    n = int(model.dims[at.MODES])
+    for row, values in ((at.U, x[0]), (at.V, problem.spread(rates[0]))):
+        state.view(row, "vehicles")[:] = values
+    state.view(at.U, "vertical")[:] = rails[:, : 2 * n]
+    state.view(at.U, "lateral")[:] = rails[:, 2 * n :]
+    state.view(at.U, "slabs")[:] = slabs
+    forces = problem.contact(y[None])
+    state.force[:], state.contact[:] = forces.local, forces.contact
+    state.wheelset_force[:], state.rail_force[:] = forces.wheelset, forces.rail
+
+
+class _Problem:
+    """Residual of steady rolling: train (n), then contact forces on the rails (6 W)."""
+
+    def __init__(self, model: Model, track: StaticTrack, V: float, V_rate: float) -> None:
+        self.model, self.track, self.V = model, track, V
+        self.train = model.given.train
+        self.pitch = self.train.wheelset_dof[:, 3]
+        self.load = self.train.gravity + V_rate * self.train.acceleration_force
+
+    def split(
+        self, y: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Coordinates (B, n), pitch rates (B, W), forces on the rails (B, W, 2, 3)."""
+        n, W = self.train.n, len(self.pitch)
+        x = y[:, :n].copy()
+        rates = x[:, self.pitch]
+        x[:, self.pitch] = 0.0
+        return x, rates, y[:, n:].reshape(-1, W, 2, 3)
+
+    def spread(self, rates: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Velocities of the train's coordinates, shape (..., n), from the pitch rates."""
+        v = np.zeros((*rates.shape[:-1], self.train.n))
+        v[..., self.pitch] = rates
+        return v
+
+    def contact(self, y: NDArray[np.float64]) -> ContactForces:
+        """Contact forces of B trial states."""
+        x, rates, force = self.split(y)
+        v = self.spread(rates)
+        rail = self.track.under_wheels(force)
+        dof = self.train.wheelset_dof
+        smooth = np.zeros((1, len(dof), at.N_IRREGULARITY))
+        return evaluate_contact(self.model, self.V, smooth, x[:, dof], v[:, dof], rail)
+
+    def residual(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces out of balance, shape (B, n + 6 W)."""
+        x, rates, force = self.split(y)
+        found = self.contact(y)
+        out = np.broadcast_to(self.load, x.shape) - x @ self.train.K.T
+        out = out - self.spread(rates) @ (self.train.C + self.V * self.train.C_speed).T
+        np.add.at(out, (slice(None), self.train.wheelset_dof), found.wheelset)
+        return np.hstack([out, (found.rail - force).reshape(len(y), -1)])
+
+    def solve(self) -> NDArray[np.float64]:
+        """Newton's method with halved steps; shape (n + 6 W,)."""
+        y = self._guess()
+        n = self.train.n
+        nudge = np.full(len(y), NUDGE_COORDINATE)
+        nudge[self.pitch], nudge[n:] = NUDGE_RATE, NUDGE_FORCE
+        for _ in range(NEWTON):
+            values = self.residual(np.vstack([y, y + np.diag(nudge), y - np.diag(nudge)]))
+            size = float(np.abs(values[0]).max())
+            if size < FORCE_TOLERANCE:
+                return y
+            m = len(y)
+            J = (values[1 : m + 1] - values[m + 1 :]).T / (2.0 * nudge)
+            step = np.linalg.lstsq(J, -values[0], rcond=1e-14)[0]
+            shares = 0.5 ** np.arange(8)
+            trials = y + shares[:, None] * step
+            y = trials[int(np.argmin(np.abs(self.residual(trials)).max(axis=1)))]
+        raise InputError(
+            f"numerics.start = 'equilibrium': no steady rolling found at {self.V * 3.6:g} km/h"
+            f" (forces out of balance by {size:.3g} N); use start = 'zero'"
+        )
+
+    def _guess(self) -> NDArray[np.float64]:
+        """Vertical equilibrium on linearised contact springs, the track held."""
+        train, dof = self.train, self.train.wheelset_dof
+        load = float(self.model.constants[at.STATIC_LOAD])
+        centre = self.model.given.contact.lookup(np.array(0.0), np.array(0.0))
+        approach = (load / centre[at.HERTZ]) ** (2.0 / 3.0)
+        stiffness = 1.5 * load / approach
+        K = train.K.copy()
+        f = self.load.copy()
+        for w, b0 in enumerate(train.half_spacing):
+            K[dof[w, 1], dof[w, 1]] += 2.0 * stiffness
+            K[dof[w, 2], dof[w, 2]] += 2.0 * stiffness * b0**2
+            f[dof[w, 1]] += 2.0 * (stiffness * approach - load)
+        x = np.linalg.lstsq(K, f, rcond=1e-12)[0]
+        x[self.pitch] = 0.0
+        force = np.zeros((len(dof), 2, 3))
+        force[:, :, 0] = load
+        sinking = self.track.under_wheels(force[None])[0, :, :, 0].mean(axis=1)
+        x[1 : train.n_dof : 5] += sinking.mean()
+        return np.concatenate([x, force.ravel()])

@@ -1,0 +1,164 @@
+"""The track under steady loads: d/dt = 0 in the moving frame, seats where they stand at one instant.
+
+Assembled from matrices on the host, apart from the kernels (which it also checks). A fastening's damper still feels the
+convective rate -V d/ds. Slabs are eliminated one by one, since each is joined to the rails only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+from numpy.typing import NDArray
+
+from tiengine.kernels import layout as at
+from tiengine.model import Model
+from tiengine.state import State
+
+__all__ = ["StaticTrack"]
+
+
+class StaticTrack:
+    """Compliance of both rails on slabs; unknowns of a rail are w, theta_y, v, theta_z, theta_x, each N."""
+
+    def __init__(self, model: Model, state: State, first_seat_s: float, V: float, train: int = 0) -> None:
+        """Assemble and factorise.
+
+        Args:
+            model: Constant data.
+            state: Gives slabs and fastenings of the window.
+            first_seat_s: Rear seat [m from the window's rear end].
+            V: Speed [m/s].
+            train: Which train's track.
+        """
+        self.model, self.V = model, V
+        n = model.given.modes
+        rail = la.block_diag(model.window.vertical(V)[2].toarray(), model.window.lateral(V)[2].toarray())
+        K = la.block_diag(rail, rail)
+        self._slabs: list[tuple[int, tuple[NDArray[np.float64], NDArray[np.int32]], NDArray[np.float64]]] = []
+        slots = model.given.slots
+        for slab, springs in self._springs(state, first_seat_s, train).items():
+            K += springs.test.T @ springs.pull
+            if slab >= state.first_slab + slots:
+                continue  # beyond the modelled slabs the ground is rigid
+            design = model.given.designs.matrices[state.design[train, slab % slots]]
+            own = springs.slab.T @ (springs.stiffness[:, None] * springs.slab)
+            to_slab = -springs.slab.T @ springs.pull
+            to_rail = -springs.test.T @ (springs.stiffness[:, None] * springs.slab)
+            lu = la.lu_factor(design.K_plate + design.K_bed + own)
+            K -= to_rail @ la.lu_solve(lu, to_slab)
+            self._slabs.append((slab % slots, lu, to_slab))
+        self._lu = la.lu_factor(K)
+        shape = model.wheel_shape
+        W = shape.shape[1]
+        place = np.zeros((10 * n, W, 2, 3))
+        for side in range(2):
+            for component, field in enumerate((0, 2, 4)):
+                rows = slice(side * 5 * n + field * n, side * 5 * n + (field + 1) * n)
+                place[rows, :, side, component] = shape[0].T
+        self._place = place.reshape(10 * n, -1)
+        q = la.lu_solve(self._lu, self._place).reshape(2, 5, n, -1)
+        fields = q[:, [0, 2, 4]]
+        value, slope = (np.einsum("wn,rfnk->wrfk", shape[kind], fields) for kind in (0, 1))
+        self._compliance = np.concatenate([value, slope, np.zeros_like(value)], axis=2)
+
+    def under_wheels(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rail motion under the wheels.
+
+        Args:
+            force: Forces on w, v, theta_x at the wheels, shape (B, W, 2, 3).
+
+        Returns:
+            w, v, theta_x, their slopes, their (zero) rates at constant s, shape (B, W, 2, 9).
+        """
+        flat = force.reshape(len(force), -1)
+        return np.einsum("wrfk,bk->bwrf", self._compliance, flat)
+
+    def motion(self, force: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Generalised coordinates under wheel forces.
+
+        Args:
+            force: Forces on w, v, theta_x at the wheels, shape (W, 2, 3).
+
+        Returns:
+            Rails, shape (2, 5 N), and slabs by slot, shape (slots, dofs).
+        """
+        return self.respond(self._place @ force.ravel())
+
+    def respond(self, load: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As :meth:`motion`, under generalised forces on the rails' coordinates, shape (10 N,)."""
+        q = la.lu_solve(self._lu, load)
+        slabs = np.zeros((self.model.given.slots, int(self.model.dims[at.SLAB_DOFS])))
+        for slot, lu, to_slab in self._slabs:
+            slabs[slot] = -la.lu_solve(lu, to_slab @ q)
+        return q.reshape(2, -1), slabs
+
+    def _springs(self, state: State, s0: float, train: int) -> dict[int, _Springs]:
+        """Springs of the seats in the window, by slab."""
+        g = self.model.given
+        d, per_slab = g.slab.fastening_pitch, g.slab.fastenings
+        j = np.arange(state.seat_scale.shape[1])
+        s = s0 + j * d
+        j = j[s < g.length]
+        phi, slope = self.model.window.shape(s[j]), self.model.window.shape_slope(s[j])
+        slab, seat = np.divmod(state.first_seat + j, per_slab)
+        found = {}
+        for k in np.unique(slab):
+            here = slab == k
+            found[int(k)] = _slab_springs(
+                self.model, seat[here], state.seat_scale[train, j[here]], phi[here], -self.V * slope[here]
+            )
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Springs:
+    """Springs between rails and one slab: force = pull . rails - stiffness (slab . slab's motion), along ``test``."""
+
+    test: NDArray[np.float64]  # (m, 10 N)
+    pull: NDArray[np.float64]  # (m, 10 N)
+    slab: NDArray[np.float64]  # (m, dofs)
+    stiffness: NDArray[np.float64]  # (m,)
+
+
+def _slab_springs(
+    model: Model,
+    seat: NDArray[np.int64],
+    scale: NDArray[np.float64],
+    phi: NDArray[np.float64],
+    rate: NDArray[np.float64],
+) -> _Springs:
+    """Vertical, rolling and lateral spring of each fastening (MODEL §3).
+
+    Args:
+        model: Constant data.
+        seat: Seats on the slab, shape (k,).
+        scale: Factors, shape (k, 2).
+        phi: Rail shape at the seats, shape (k, N).
+        rate: Its convective rate -V d/ds, shape (k, N).
+    """
+    fastening, r, n = model.given.fastening, model.given.rail, model.given.modes
+    a, b, design = r.arm_fastening, r.half_base, model.given.designs.matrices[0]
+    kinds = (  # arms on w, v, theta_x; stiffness, damping
+        ((1.0, 0.0, 0.0), fastening.vertical_stiffness, fastening.vertical_damping),
+        ((0.0, 0.0, b), fastening.vertical_stiffness, fastening.vertical_damping),
+        ((0.0, 1.0, -a), fastening.lateral_stiffness, fastening.lateral_damping),
+    )
+    test = np.zeros((len(seat), 2, 3, 2, 5, n))
+    flow = np.zeros_like(test)
+    slab = np.zeros((len(seat), 2, 3, design.n))
+    k, c = np.zeros((len(seat), 2, 3)), np.zeros((len(seat), 2, 3))
+    for side in range(2):
+        for kind, (arms, stiffness, damping) in enumerate(kinds):
+            for field, arm in zip((0, 2, 4), arms, strict=True):
+                test[:, side, kind, side, field] = arm * phi
+                flow[:, side, kind, side, field] = arm * rate
+            k[:, side, kind], c[:, side, kind] = scale[:, side] * stiffness, scale[:, side] * damping
+        for i, j in enumerate(seat):
+            slab[i, side, 0, design.seat_index[j, side]] = design.seat_w[j, side]
+            slab[i, side, 1, design.seat_index[j, side]] = b * design.seat_slope[j, side]
+            slab[i, side, 2, -2:] = 1.0, design.seat_x[j]
+    m = k.size
+    test, flow = test.reshape(m, -1), flow.reshape(m, -1)
+    return _Springs(test, k.reshape(m, 1) * test + c.reshape(m, 1) * flow, slab.reshape(m, -1), k.ravel())
