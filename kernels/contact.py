@@ -2,12 +2,13 @@
 
 At the end of a step the coordinates a wheel feels are x = x_free + S q with q the contact's generalised forces, because
 the rest of the step is linear: S = beta dt^2 A^-1 for displacements, gamma dt A^-1 for rates. Wheels stand still in
-the window, so S is constant. Newton's method finds the forces f = (N, Fx, Fy, Mz) of both wheels of a wheelset with
+the window, so S is constant. The wheels of one wheelset are solved together; all the others enter x_free with their
+forces of the pass before. Newton's method finds the forces f = (N, Fx, Fy, Mz) of both wheels of a wheelset with
 
     f = law(e),  e = (delta, creepages)(x_free + S B f)
 
-The Jacobian is I - D W with D = d law / d e and W = H S B; it leaves out the change of geometry along the step and the
-coupling to other wheelsets, the residual does not: other wheelsets enter with their forces of the pass before.
+The Jacobian is I - D W with D = d law / d e and W = H S B; it leaves out how the geometry changes along the step, which
+the residual does not.
 """
 
 import taichi as ti
@@ -104,7 +105,7 @@ def add_generalised(
 @ti.func
 def evaluate(
     b: int, wheelset: int, side: int, V: float, irregularity: ti.template(), constants: Array, wheel: Array, dims: Array,
-    table: Array, x: ti.template(), dx: ti.template(), rail_compliance: Array, rail_free: Array, rail_force: Array,
+    table: Array, x: ti.template(), dx: ti.template(), rail_compliance: Array, rail_free: Array, rail_force: Array, rail_before: Array,
     contact_out: Array,
 ):  # fmt: skip
     """Contact state of one wheel at the end-of-step coordinates, stored and returned."""
@@ -113,7 +114,7 @@ def evaluate(
         r[m] = rail_free[b, wheelset, side, m]
     for m in ti.static(range(3)):
         for k in ti.static(range(3)):
-            q = rail_force[b, wheelset, side, k]
+            q = rail_force[b, wheelset, side, k] - rail_before[b, wheelset, side, k]
             r[m] += constants[at.BETA_DT2] * rail_compliance[wheelset, 0, m, k] * q
             r[3 + m] += constants[at.BETA_DT2] * rail_compliance[wheelset, 1, m, k] * q
             r[6 + m] += constants[at.GAMMA_DT] * rail_compliance[wheelset, 0, m, k] * q
@@ -171,7 +172,7 @@ def response(
 def solve_wheelset(
     b: int, wheelset: int, V: float, irregularity: ti.template(), dims: Array, constants: Array, wheel: Array, dof: Array,
     table: Array, wheelset_compliance: Array, rail_compliance: Array, motion: Array, rail_free: Array, contact: Array,
-    force: Array, wheelset_force: Array, rail_force: Array,
+    force: Array, wheelset_force: Array, rail_force: Array, wheelset_before: Array, rail_before: Array,
 ):  # fmt: skip
     """Newton's method for the eight local forces of one wheelset; returns the number of iterations."""
     x_free = wheelset_coordinates(b, wheelset, dims, dof, at.U, motion)
@@ -182,16 +183,17 @@ def solve_wheelset(
     change = 2.0 * tolerance
     while change > tolerance and iterations < ITERATIONS:
         add_generalised(b, wheelset, constants, wheel, contact, force, wheelset_force, rail_force)
-        x, dx = x_free, dx_free
+        a = ti.Vector.zero(ti.f64, 5)
         for m in ti.static(range(5)):
             for k in ti.static(range(5)):
-                q = wheelset_compliance[wheelset, m, k] * wheelset_force[b, wheelset, k]
-                x[m] += constants[at.BETA_DT2] * q
-                dx[m] += constants[at.GAMMA_DT] * q
+                increment = wheelset_force[b, wheelset, k] - wheelset_before[b, wheelset, k]
+                a[m] += wheelset_compliance[wheelset, m, k] * increment
+        x = x_free + constants[at.BETA_DT2] * a
+        dx = dx_free + constants[at.GAMMA_DT] * a
         left = evaluate(b, wheelset, 0, V, irregularity, constants, wheel, dims, table, x, dx, rail_compliance, rail_free,
-                        rail_force, contact)  # fmt: skip
+                        rail_force, rail_before, contact)  # fmt: skip
         right = evaluate(b, wheelset, 1, V, irregularity, constants, wheel, dims, table, x, dx, rail_compliance, rail_free,
-                         rail_force, contact)  # fmt: skip
+                         rail_force, rail_before, contact)  # fmt: skip
         f_l, D_l = wr.contact_law(left, constants[at.FRICTION])
         f_r, D_r = wr.contact_law(right, constants[at.FRICTION])
         B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, left)

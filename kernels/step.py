@@ -76,29 +76,29 @@ def add_vehicle_forces(b: int, V_rate: float, dims: Array, load: Array, dof: Arr
 
 
 @ti.func
-def update(b: int, part: ti.template(), dims: Array, constants: Array, motion: Array):
-    """Newmark correctors from the acceleration in row A."""
-    start, count = segment(b, part, dims)
-    for i in range(start, start + count):
-        motion[at.U, i] = motion[at.U_PREDICTED, i] + constants[at.BETA_DT2] * motion[at.A, i]
-        motion[at.V, i] = motion[at.V_PREDICTED, i] + constants[at.GAMMA_DT] * motion[at.A, i]
-
-
-@ti.func
-def accept(b: int, dims: Array, constants: Array, motion: Array):
-    """Take the solution without contact as the iterate."""
+def accept(b: int, dims: Array, motion: Array):
+    """Take the solution without contact as the iterate's acceleration."""
     for part in ti.static(range(4)):
         start, count = segment(b, part, dims)
         for i in range(start, start + count):
             motion[at.A, i] = motion[at.X, i]
-        update(b, part, dims, constants, motion)
+
+
+@ti.func
+def update(b: int, dims: Array, constants: Array, motion: Array):
+    """Newmark correctors from the acceleration in row A."""
+    for part in ti.static(range(4)):
+        start, count = segment(b, part, dims)
+        for i in range(start, start + count):
+            motion[at.U, i] = motion[at.U_PREDICTED, i] + constants[at.BETA_DT2] * motion[at.A, i]
+            motion[at.V, i] = motion[at.V_PREDICTED, i] + constants[at.GAMMA_DT] * motion[at.A, i]
 
 
 @ti.func
 def add_contact_response(
     b: int, dims: Array, vertical: Array, lateral: Array, vehicle: Array, wheelset_force: Array, rail_force: Array, motion: Array
 ):
-    """a += A^-1 times the contact forces; the columns of A^-1 at the wheels are constant."""
+    """a += A^-1 times contact forces; the columns of A^-1 at the wheels are constant."""
     n, wheelsets = dims[at.MODES], dims[at.WHEELSETS]
     for side in range(2):
         w = (b * 2 + side) * 2 * n
@@ -120,6 +120,28 @@ def add_contact_response(
             for m in ti.static(range(5)):
                 total += vehicle[i, 5 * k + m] * wheelset_force[b, k, m]
         motion[at.A, base + i] = motion[at.A, base + i] + total
+
+
+@ti.func
+def keep_increments(b: int, dims: Array, force: Array, rail: Array, force_before: Array, rail_before: Array):
+    """Replace the contact forces of the pass before by the change since."""
+    for w in range(dims[at.WHEELSETS]):
+        for m in ti.static(range(5)):
+            force_before[b, w, m] = force[b, w, m] - force_before[b, w, m]
+        for side in range(2):
+            for m in ti.static(range(3)):
+                rail_before[b, w, side, m] = rail[b, w, side, m] - rail_before[b, w, side, m]
+
+
+@ti.func
+def keep_forces(b: int, dims: Array, force: Array, rail: Array, force_before: Array, rail_before: Array):
+    """Remember the contact forces for the next pass."""
+    for w in range(dims[at.WHEELSETS]):
+        for m in ti.static(range(5)):
+            force_before[b, w, m] = force[b, w, m]
+        for side in range(2):
+            for m in ti.static(range(3)):
+                rail_before[b, w, side, m] = rail[b, w, side, m]
 
 
 @ti.func
@@ -254,6 +276,8 @@ def contact_and_update(
     force: Reals4,
     wheelset_force: Reals3,
     rail_force: Reals4,
+    wheelset_before: Reals3,
+    rail_before: Reals4,
     wheel_out: Reals4,
     iterations_out: Ints2,
     wheel_record: Reals5,
@@ -265,7 +289,12 @@ def contact_and_update(
         if z % ti.static(512 if parallel else 1) == 0:
             b = z // ti.static(512 if parallel else 1)
             V = clock[tick[at.STEP], at.SPEED]
-            accept(b, dims, constants, motion)
+            accept(b, dims, motion)
+            keep_forces(b, dims, wheelset_force, rail_force, wheelset_before, rail_before)
+            add_contact_response(
+                b, dims, vertical_response, lateral_response, vehicle_response, wheelset_before, rail_before, motion
+            )
+            update(b, dims, constants, motion)
             for w in range(dims[at.WHEELSETS]):
                 for side in range(2):
                     ct.rail_coordinates(b, w, side, dims, wheel_shape, motion, rail_free)
@@ -274,15 +303,14 @@ def contact_and_update(
                     felt[m] = irregularity[b, tick[at.STEP], w, m]
                 count = ct.solve_wheelset(
                     b, w, V, felt, dims, constants, wheel, wheelset_dof, table, wheelset_compliance, rail_compliance,
-                    motion, rail_free, contact, force, wheelset_force, rail_force,
+                    motion, rail_free, contact, force, wheelset_force, rail_force, wheelset_before, rail_before,
                 )  # fmt: skip
                 iterations_out[b, w] = ti.max(iterations_out[b, w], count)
+            keep_increments(b, dims, wheelset_force, rail_force, wheelset_before, rail_before)
             add_contact_response(
-                b, dims, vertical_response, lateral_response, vehicle_response, wheelset_force, rail_force, motion
+                b, dims, vertical_response, lateral_response, vehicle_response, wheelset_before, rail_before, motion
             )
-            update(b, 0, dims, constants, motion)
-            update(b, 1, dims, constants, motion)
-            update(b, 3, dims, constants, motion)
+            update(b, dims, constants, motion)
             if tick[at.LAST_PASS] == 1:
                 for w in range(dims[at.WHEELSETS]):
                     ct.wheel_output(b, w, contact, force, rail_force, wheel_out)

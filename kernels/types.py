@@ -14,9 +14,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Reals1 = NDArray[np.float64]
-    Reals2 = Reals3 = Reals4 = Reals5 = Reals1
+    Reals2 = NDArray[np.float64]
+    Reals3 = NDArray[np.float64]
+    Reals4 = NDArray[np.float64]
+    Reals5 = NDArray[np.float64]
     Ints1 = NDArray[np.int32]
-    Ints2 = Ints3 = Ints1
+    Ints2 = NDArray[np.int32]
+    Ints3 = NDArray[np.int32]
     Array = Any
 else:
     Reals1 = ti.types.ndarray(dtype=ti.f64, ndim=1)

@@ -164,5 +164,5 @@ def _classes(annotation: Any) -> list[type]:
 
 
 def _nearest(key: str, known: list[str]) -> str:
-    close = difflib.get_close_matches(key, known, n=1)
+    close = difflib.get_close_matches(key, known, n=1) or [name for name in known if name.startswith(key)]
     return f"; did you mean {close[0]!r}?" if close else f"; known: {', '.join(known)}" if known else ""

@@ -29,7 +29,7 @@ class State:
         design: Design of the slab in each slot, shape (B, slots).
         modal, seat_motion, seat_force: Fastening scratch and forces.
         pressure: Largest and smallest mortar pressure of each slab [Pa], shape (B, slots, 2).
-        rail_free, contact, force, wheelset_force, rail_force: Contact scratch; ``force`` starts the next solve.
+        rail_free, contact, force, wheelset_force, rail_force, wheelset_before, rail_before: Contact scratch; ``force`` starts the next solve.
         wheel: Output of the wheels, shape (B, W, 2, N_WHEEL).
         iterations: Most Newton iterations of each wheelset since last reset, shape (B, W).
         first_seat, first_slab: Rear seat and slab of the window.
@@ -47,6 +47,8 @@ class State:
     force: NDArray[np.float64]
     wheelset_force: NDArray[np.float64]
     rail_force: NDArray[np.float64]
+    wheelset_before: NDArray[np.float64]
+    rail_before: NDArray[np.float64]
     wheel: NDArray[np.float64]
     iterations: NDArray[np.int32]
     first_seat: int = -1
@@ -79,6 +81,8 @@ class State:
             force=np.zeros((B, W, 2, 4)),
             wheelset_force=np.zeros((B, W, 5)),
             rail_force=np.zeros((B, W, 2, 3)),
+            wheelset_before=np.zeros((B, W, 5)),
+            rail_before=np.zeros((B, W, 2, 3)),
             wheel=np.zeros((B, W, 2, at.N_WHEEL)),
             iterations=np.zeros((B, W), dtype=np.int32),
             _blocks=blocks,

@@ -87,7 +87,7 @@ class Stepper:
                 self._tick, m.dims, m.constants, chunk.clock, m.given.contact.values, chunk.irregularity, m.wheel,
                 train.wheelset_dof, m.wheel_shape, b.wheelset_compliance, b.rail_compliance, b.vertical_response,
                 b.lateral_response, b.vehicle_response, s.motion, s.rail_free, s.contact, s.force, s.wheelset_force,
-                s.rail_force, s.wheel, s.iterations, chunk.wheel, chunk.body,
+                s.rail_force, s.wheelset_before, s.rail_before, s.wheel, s.iterations, chunk.wheel, chunk.body,
             ),
             public=public,
         )  # fmt: skip

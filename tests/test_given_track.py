@@ -1,0 +1,107 @@
+"""Tracks from a file or a user's function: splines through known points and the errors of bad input."""
+
+import numpy as np
+import pytest
+
+from tiengine.irregularity import IrregularityParams, from_function, make_irregularity
+from tiengine.quantity import InputError
+
+FAR = -1e9  # the irregularity has begun long before any chainage of these tests
+MEASURED = "x,z_v,theta\n# by hand\n" + "".join(
+    f"{x},{0.001 * (x % 3)},{1e-4 * x}\n" for x in range(0, 100, 2)
+)
+
+
+def test_user_function_as_spline():
+    """A wave of 2 m on a grid of 0.05 m: value within (kh)^4/384, slope 0.02 (kh)^3 k; exact on the grid."""
+    k, h = np.pi, 0.05
+
+    def wave(x):
+        return np.sin(k * x), 0.0, np.cos(k * x), 1.0
+
+    track_ = from_function(wave, taper_start=FAR, spacing=h)
+    x = np.random.default_rng(0).uniform(-500.0, 500.0, 3000)
+    sampled = track_.sample(x)
+    exact = np.stack(
+        [np.sin(k * x), 0 * x, np.cos(k * x), 1 + 0 * x, k * np.cos(k * x), 0 * x, -k * np.sin(k * x), 0 * x],
+        -1,
+    )
+    error = np.abs(sampled - exact).max(axis=0)
+    assert (error[:4] < 1.1 * (k * h) ** 4 / 384 + 1e-13).all()  # a tenth for the next order
+    assert (error[4:] < 0.02 * (k * h) ** 3 * k + 1e-12).all()
+    nodes = h * np.arange(-5000, 5000, 37)
+    assert np.abs(track_.sample(nodes)[:, 0] - np.sin(k * nodes)).max() < 1e-12  # rounding
+
+
+def test_user_function_with_slopes():
+    """The user's own slopes are used, the taper's product rule on top."""
+
+    def parabola(x):
+        return x**2, x, 0.0, 0.0
+
+    def slopes(x):
+        return 2 * x, 1.0, 0.0, 0.0
+
+    sampled = from_function(parabola, slopes=slopes, taper_start=0.0, taper=10.0).sample(
+        np.array([5.0, 20.0])
+    )
+    T, dT = 0.5, 30 / 16 / 10.0  # the step's middle
+    assert sampled[0] == pytest.approx([25 * T, 5 * T, 0, 0, 10 * T + 25 * dT, T + 5 * dT, 0, 0])
+    assert sampled[1] == pytest.approx([400, 20, 0, 0, 40, 1, 0, 0])
+
+
+def test_measured_series(tmp_path):
+    """Through the points away from the ends, zero with zero slope outside, faded over the taper."""
+    path = tmp_path / "track.csv"
+    path.write_text(MEASURED)
+    track_ = make_irregularity(IrregularityParams(file=str(path), taper=10.0, scale=2.0), FAR)
+    x = np.arange(10.0, 88.0, 2.0)
+    sampled = track_.sample(x)
+    assert sampled[:, 0] == pytest.approx(2 * 0.001 * (x % 3), abs=1e-15)
+    assert sampled[:, 2] == pytest.approx(2e-4 * x, rel=1e-12)
+    assert not sampled[:, [1, 3]].any()
+    assert not track_.sample(np.array([-1e6, -0.1, 0.0, 98.0, 98.1, 1e6])).any()
+    assert track_.shortest_wavelength == 4.0  # two points a wave
+    eps = 1e-4
+    inside = np.array([3.0, 50.3, 93.0])
+    difference = (track_.sample(inside + eps) - track_.sample(inside - eps))[:, :4] / (2 * eps)
+    assert track_.sample(inside)[:, 4:] == pytest.approx(difference, abs=1e-9)  # eps^2 z''' = 1e-8 x 0.01
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "line 1: must name the columns"),
+        ("x,zv\n0,0\n", r"line 1: column 'zv': unknown; did you mean 'z_v'\?"),
+        ("x,x,z_v\n", "line 1: a column is named twice"),
+        ("z_v,theta\n0,0\n", "line 1: needs column 'x'"),
+        (MEASURED + "98.5,low,0\n", "line 53: z_v = 'low': must be a finite number"),
+        (MEASURED + "98.5,nan,0\n", "line 53: z_v = 'nan': must be a finite number"),
+        (MEASURED + "98.5,0\n", "line 53: 2 values; the header names 3 columns"),
+        (MEASURED + "97,0,0\n", "line 53: x = 97: must be > the x before it"),
+        ("x,z_v\n0,0\n1,0\n", "line 3: 2 points; a spline needs at least 4"),
+    ],
+)
+def test_bad_file_is_refused(tmp_path, text, reason):
+    """One line that names file, line and reason."""
+    path = tmp_path / "track.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=f"track.csv, {reason}"):
+        make_irregularity(IrregularityParams(file=str(path)), 0.0)
+
+
+def test_missing_file_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"irregularity.file = .*none.csv': cannot be read \(No such file"):
+        make_irregularity(IrregularityParams(file=str(tmp_path / "none.csv")), 0.0)
+
+
+def test_bad_function_is_refused():
+    """Spacing, number of series, values and shape."""
+    with pytest.raises(InputError, match=r"irregularity.spacing = 0: must be > 0"):
+        from_function(lambda x: (x, x, x, x), taper_start=0.0, spacing=0.0)
+    with pytest.raises(InputError, match="gives 2 series; must be 4"):
+        from_function(lambda x: (x, x), taper_start=FAR).sample(np.zeros(1))
+    with pytest.raises(InputError, match="must be finite everywhere"):
+        from_function(lambda x: (x, x, x, x * np.nan), taper_start=FAR).sample(np.zeros(1))
+    with pytest.raises(InputError, match="must have the shape of x"):
+        from_function(lambda x: (x, x, x, x[:3]), taper_start=FAR).sample(np.zeros(1))

@@ -1,0 +1,228 @@
+"""The equations of a train with the bodies' longitudinal motion still in them (MODEL §4).
+
+Every body has six motions here (x, y, z, roll, pitch, yaw); :mod:`tiengine.train` strikes out x. Each
+connector contributes B' k B and B' c B with B its elongation by the motions. A damper's initial slope and a
+stop's stand in C and K; the kernel of :mod:`tiengine.kernels.suspension` adds the deviation of its table from
+that slope.
+
+Longitudinal inertia. Bodies have no longitudinal coordinate, but under V(t) their inertia forces -m Vdot go
+to the wheelsets through the springs. Let x be the bodies' small longitudinal motions relative to the
+wheelsets. Quasi-statically K_xx x = -m Vdot - K_xu u. The part of x due to Vdot pushes the coordinates u with
+-K_ux x = K_ux K_xx^-1 m Vdot: moments that lift the nose when speed grows and lower it in braking. Each
+spring pushes both its bodies at the height halfway between its ends, so that push and counter-push leave no
+moment over. The part of x due to u is left out, as it is from K (no longitudinal degree of freedom).
+
+Spin. A wheelset's pitch is measured from its spin -V/r0, J (pitch'' - Vdot/r0) = moment: hence +J Vdot/r0.
+
+Effort. What changes the speed acts at the axles (``"axles"``: creep forces carry only the wheelsets' spin),
+or at the wheels' rims (``"wheels"``: every wheelset gets the torque -(m_s r0 + J/r0) Vdot and its frame the
+reaction, so that creep forces carry m_s Vdot with m_s its equal share of the vehicle's mass).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.connector import Body, Damper, Direction, Joint, Spring, end_motion
+from tiengine.quantity import InputError
+from tiengine.vehicle import Vehicle
+
+__all__ = ["Assembly", "Element", "Placed", "longitudinal_push", "spin_push"]
+
+_AXES: dict[Direction, int] = {"x": 0, "y": 1, "z": 2}
+_FORCE_OF_RATE, _FORCE_OF_ELONGATION = 0, 1
+
+
+class Placed(NamedTuple):
+    """Body in the train: unique name, number of its vehicle, x from the first vehicle's centre [m]."""
+
+    name: str
+    vehicle: int
+    x: float
+    body: Body
+
+
+class Element(NamedTuple):
+    """Nonlinear element: name, columns and row of its elongation, kind, odd force table."""
+
+    name: str
+    columns: NDArray[np.intp]
+    row: NDArray[np.float64]
+    kind: int
+    table: NDArray[np.float64]
+
+    @property
+    def slope(self) -> float:
+        """Initial slope of the table, which stands in C or K [N s/m, N/m]."""
+        return float(self.table[1, 1] / self.table[1, 0])
+
+
+class Assembly:
+    """Matrices over six motions a body, then the internal states of series springs.
+
+    Attributes:
+        M: Mass, shape (size, size).
+        C: Damping, likewise.
+        K: Stiffness, likewise.
+        K_push: Stiffness of the longitudinal springs with both ends at their middle height, likewise.
+        elements: What is nonlinear.
+    """
+
+    def __init__(self, bodies: Sequence[Placed], internal: int) -> None:
+        """Start from the bodies' inertia.
+
+        Args:
+            bodies: In the order of the coordinates.
+            internal: Number of internal states to come.
+        """
+        self.bodies = bodies
+        self.first_internal = self._next_internal = 6 * len(bodies)
+        self.size = self.first_internal + internal
+        self.M, self.C, self.K, self.K_push = (np.zeros((self.size, self.size)) for _ in range(4))
+        self.elements: list[Element] = []
+        for i, (_, _, _, body) in enumerate(bodies):
+            own = np.arange(6 * i, 6 * i + 6)
+            self.M[own, own] = (body.mass, body.mass, body.mass, body.Jx, body.Jy, body.Jz)
+
+    def add_vehicle(self, vehicle: Vehicle, first: int, series: bool, prefix: str) -> None:
+        """Add the connectors of a vehicle.
+
+        Args:
+            vehicle: The vehicle.
+            first: Its first body.
+            series: Whether dampers with ``k_series`` get an internal state.
+            prefix: Put before the names of its elements.
+        """
+        index = {body.name: first + i for i, body in enumerate(vehicle.body)}
+        for spring in vehicle.spring:
+            columns, B = self._elongation(spring, index)
+            self.K[np.ix_(columns, columns)] += B.T * spring.stiffness @ B
+            self.C[np.ix_(columns, columns)] += B.T * spring.damping @ B
+            _, B = self._elongation(_levelled(spring), index)
+            _add(self.K_push, columns, B[0], spring.kx)
+        for damper in vehicle.damper:
+            columns, B = self._elongation(damper, index)
+            self._add_damper(damper, prefix, columns, B[_AXES[damper.direction]], series)
+        for stop in vehicle.stop:
+            columns, B = self._elongation(stop, index)
+            row = B[_AXES[stop.direction]]
+            self._add_element(self.K, prefix + stop.name, columns, row, _FORCE_OF_ELONGATION, stop.table)
+
+    def _elongation(
+        self, joint: Joint, index: dict[str, int]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Columns of both bodies (12,) and the six elongations by them (6, 12)."""
+        a, b = index[joint.a], index[joint.b]
+        columns = np.concatenate([6 * a + np.arange(6), 6 * b + np.arange(6)])
+        motion_a = end_motion(self.bodies[a].body, joint.point_a)
+        motion_b = end_motion(self.bodies[b].body, joint.point_b)
+        return columns, np.hstack([motion_a, -motion_b])
+
+    def _add_damper(
+        self, damper: Damper, prefix: str, columns: NDArray[np.intp], row: NDArray[np.float64], series: bool
+    ) -> None:
+        """Damper over the elongation, or behind its series spring over an internal state s.
+
+        The spring carries k (elongation - s), the damper F(s'); s has no mass.
+        """
+        if series and damper.k_series > 0.0:
+            s = self._next_internal
+            self._next_internal += 1
+            _add(self.K, np.append(columns, s), np.append(row, -1.0), damper.k_series)
+            columns, row = np.array([s]), np.ones(1)
+        self._add_element(self.C, prefix + damper.name, columns, row, _FORCE_OF_RATE, damper.table)
+
+    def _add_element(
+        self,
+        matrix: NDArray[np.float64],
+        name: str,
+        columns: NDArray[np.intp],
+        row: NDArray[np.float64],
+        kind: int,
+        table: NDArray[np.float64],
+    ) -> None:
+        """Initial slope to the matrix; an element unless the law is that one straight line."""
+        element = Element(name, columns, row, kind, table)
+        _add(matrix, columns, row, element.slope)
+        if len(table) > 2:
+            self.elements.append(element)
+
+
+def _levelled(spring: Spring) -> Spring:
+    """The spring with both ends at their middle height."""
+    height = 0.5 * (spring.point_a[2] + spring.point_b[2])
+    ends = {"point_a": (*spring.point_a[:2], height), "point_b": (*spring.point_b[:2], height)}
+    return spring.model_copy(update=ends)
+
+
+def _add(
+    matrix: NDArray[np.float64], columns: NDArray[np.intp], row: NDArray[np.float64], value: float
+) -> None:
+    """Add value row' row at the columns."""
+    matrix[np.ix_(columns, columns)] += value * np.outer(row, row)
+
+
+def longitudinal_push(full: Assembly) -> NDArray[np.float64]:
+    """K_ux K_xx^-1 m, the push of the bodies' longitudinal inertia per unit Vdot.
+
+    Args:
+        full: The train.
+
+    Returns:
+        Generalised force [kg, kg m] on every motion, zero on the longitudinal ones, shape (size,).
+
+    Raises:
+        InputError: No longitudinal spring carries a body's inertia to the wheelsets.
+    """
+    sprung = np.array(
+        [6 * i for i, placed in enumerate(full.bodies) if not placed.body.wheelset], dtype=np.intp
+    )
+    mass = np.diag(full.M)[sprung]
+    K_xx = full.K_push[np.ix_(sprung, sprung)]
+    x = np.linalg.lstsq(K_xx, mass, rcond=None)[0] if len(sprung) else mass
+    lost = np.abs(K_xx @ x - mass)
+    if (lost > 1e-6 * mass.max(initial=0.0)).any():
+        name = full.bodies[sprung[np.argmax(lost)] // 6].name
+        raise InputError(f"{name}: no longitudinal spring (kx) carries its inertia to the wheelsets")
+    push = full.K_push[:, sprung] @ x
+    push[0 : full.first_internal : 6] = 0.0
+    return np.asarray(push, dtype=np.float64)
+
+
+def spin_push(full: Assembly, vehicles: Sequence[Vehicle], effort: str) -> NDArray[np.float64]:
+    """Pitch moments per unit Vdot on wheelsets and, with the effort at the wheels, on their frames.
+
+    Args:
+        full: The train.
+        vehicles: Its vehicles.
+        effort: ``"axles"`` or ``"wheels"``.
+
+    Returns:
+        Generalised force [kg m] on every motion, shape (size,).
+
+    Raises:
+        InputError: Unknown effort.
+    """
+    if effort not in ("axles", "wheels"):
+        raise InputError(f"train.effort = {effort!r}: must be 'axles' or 'wheels'")
+    push = np.zeros(full.size)
+    for i, (_, k, _, body) in enumerate(full.bodies):
+        if not body.wheelset:
+            continue
+        r0 = vehicles[k].wheel_radius
+        push[6 * i + 4] += body.Jy / r0
+        if effort == "wheels":
+            torque = vehicles[k].mass / len(vehicles[k].axle_positions) * r0 + body.Jy / r0
+            push[6 * i + 4] -= torque
+            push[6 * _guide(full, i) + 4] += torque
+    return push
+
+
+def _guide(full: Assembly, wheelset: int) -> int:
+    """Body that guides a wheelset: the one with the stiffest longitudinal spring to it."""
+    coupling = -full.K_push[6 * wheelset, 0 : full.first_internal : 6]
+    return int(np.argmax(coupling))

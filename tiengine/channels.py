@@ -1,0 +1,62 @@
+"""What a run records: names, units and meaning of every channel of the result file.
+
+The names are an interface: other people's scripts read them. Forces are those of the wheel on the rail in
+the track frame (x forward, y right, z down): vertical positive down, lateral positive to the right.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+__all__ = ["BODY", "DOFS", "GROUPS", "IRREGULARITY", "SIDES", "WHEEL", "Channel"]
+
+
+class Channel(NamedTuple):
+    """One recorded quantity.
+
+    Attributes:
+        units: SI unit; several by degree of freedom are separated by commas.
+        long_name: What it is, in words.
+    """
+
+    units: str
+    long_name: str
+
+
+SIDES = ("left", "right")
+DOFS = ("y", "z", "roll", "pitch", "yaw")
+
+WHEEL = {
+    "normal_force": Channel("N", "normal contact force, zero when the wheel has lifted off"),
+    "vertical_force": Channel("N", "vertical force of the wheel on the rail, positive down"),
+    "lateral_force": Channel("N", "lateral force of the wheel on the rail, positive to the right"),
+    "longitudinal_creepage": Channel("1", "longitudinal creepage"),
+    "lateral_creepage": Channel("1", "lateral creepage in the contact plane"),
+    "spin_creepage": Channel("1/m", "spin creepage"),
+    "penetration": Channel("m", "elastic approach along the contact normal, negative when lifted"),
+    "contact_position_wheel": Channel("m", "contact position on the wheel, outward from the tape circle"),
+    "contact_position_rail": Channel("m", "contact position on the rail, outward from the crown"),
+    "rolling_radius": Channel("m", "rolling radius at the contact"),
+    "rail_deflection": Channel("m", "vertical deflection of the rail under the wheel, positive down"),
+    "longitudinal_creep_force": Channel("N", "longitudinal creep force on the wheel"),
+    "lateral_creep_force": Channel("N", "lateral creep force on the wheel, in the contact plane"),
+    "spin_moment": Channel("N m", "spin creep moment on the wheel about the contact normal"),
+}
+"""Dimensions (time, wheelset, side)."""
+
+BODY = {
+    "displacement": Channel("m, m, rad, rad, rad", "displacement of the body: y, z, roll, pitch, yaw"),
+    "velocity": Channel("m/s, m/s, rad/s, rad/s, rad/s", "velocity of the body: y, z, roll, pitch, yaw"),
+    "acceleration": Channel(
+        "m/s^2, m/s^2, rad/s^2, rad/s^2, rad/s^2", "acceleration of the body: y, z, roll, pitch, yaw"
+    ),
+}
+"""Dimensions (time, body, dof)."""
+
+IRREGULARITY = {
+    "vertical": Channel("m", "vertical irregularity as felt at the wheel, positive down"),
+    "lateral": Channel("m", "lateral irregularity as felt at the wheel, positive to the right"),
+}
+"""Dimensions (time, wheelset, side)."""
+
+GROUPS = {"wheel": WHEEL, "body": BODY, "irregularity": IRREGULARITY}

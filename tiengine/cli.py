@@ -1,0 +1,195 @@
+"""Command line: ``tiengine run``, ``tiengine list``, ``tiengine info``.
+
+Bad input ends with one line on stderr and exit status 2. Taichi is imported only by ``run``, so that the
+others answer at once.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from tiengine.presets import KINDS, preset_names, preset_source
+from tiengine.quantity import InputError
+
+__all__ = ["main"]
+
+SUMMARY = {
+    "dofs": ("degrees of freedom", "{:d}"),
+    "time_step": ("time step", "{:.3g} s"),
+    "simulated_time": ("simulated time", "{:.3f} s"),
+    "real_time_factor": ("real-time factor (above 1: faster than real time)", "{:.2f}"),
+    "wall_time_import": ("wall time, import", "{:.2f} s"),
+    "wall_time_jit": ("wall time, JIT", "{:.2f} s"),
+    "wall_time_setup": ("wall time, set-up", "{:.2f} s"),
+    "wall_time_loop": ("wall time, loop", "{:.2f} s"),
+    "wall_time_writing": ("wall time, writing", "{:.2f} s"),
+}
+"""Root attributes of a result that are shown: their words and format."""
+
+
+class _Commands(click.Group):
+    """Turns bad input into one line and exit status 2."""
+
+    def invoke(self, context: click.Context) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(context)
+        except InputError as error:
+            click.echo(f"error: {' '.join(str(error).split())}", err=True)
+            context.exit(2)
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="tiengine", message="%(prog)s %(version)s")
+def main() -> None:
+    """Moving train-slab-track interaction in three dimensions."""
+    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
+
+
+@main.command()
+@click.argument("scenario")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Result file; default: the scenario's name."
+)
+@click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key: train.speed_kmh=300"
+)
+@click.option("--quiet", is_flag=True, help="Print nothing but errors.")
+@click.option("--force", is_flag=True, help="Replace an existing result file.")
+def run(scenario: str, output: Path | None, settings: Sequence[str], quiet: bool, force: bool) -> None:
+    """Simulate SCENARIO, the name of a built-in one or the path of a TOML file."""
+    from tiengine.scenario import load_scenario
+
+    resolved = load_scenario(scenario, settings)
+    path = output or Path(f"{Path(resolved.name).name}.h5")
+
+    from tiengine.writer import check_output
+
+    check_output(path, force)
+
+    from tiengine import simulate
+
+    console = Console(stderr=True, quiet=quiet)
+    with _ended_by_sigterm(), _progress(console, resolved.name) as progress:
+        result = simulate.run(resolved, path, force=force, progress=progress)
+    with result:
+        if not quiet:
+            _print_rows([*_summary(result.attributes), ("result", str(path))])
+
+
+@main.command("list")
+@click.argument("kind", type=click.Choice(KINDS), required=False)
+def list_presets(kind: str | None) -> None:
+    """List the presets of the library and where their numbers come from."""
+    for each in (kind,) if kind else KINDS:
+        click.secho(each, bold=True)
+        _print_rows([(f"  {name}", preset_source(each, name)) for name in preset_names(each)])
+
+
+@main.command()
+@click.argument("file", type=click.Path(path_type=Path))
+def info(file: Path) -> None:
+    """Say what a result FILE holds and how it was made."""
+    from tiengine import results
+
+    with results.open(file) as result:
+        attributes = result.attributes
+        scenario = tomllib.loads(result.scenario_toml)
+        rows = [("scenario", str(scenario.get("name", "")))]
+        for section, key in (("train", "vehicles"), ("train", "speed_kmh"), ("train", "distance")):
+            rows.append((f"{section}.{key}", _text(scenario.get(section, {}).get(key))))
+        hidden = {*SUMMARY, "scenario"}
+        rows += [(key, str(value)) for key, value in attributes.items() if key not in hidden]
+        rows += _summary(attributes)
+        for train in range(result.trains):
+            path = f"trains/{train:03d}"
+            rows += [(f"{path}/{group}", content) for group, content in _groups(result[path])]
+    _print_rows(rows)
+
+
+def _text(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _groups(train: Any) -> Iterator[tuple[str, str]]:
+    """Name of every group of a train, with its samples and channels."""
+    for name, group in train.items():
+        if hasattr(group, "keys"):  # the train's own time is a dataset
+            channels = [key for key, dataset in group.items() if "coordinates" in dataset.attrs]
+            yield name, f"{group['time'].shape[0]} samples of {', '.join(channels)}"
+
+
+def _print_rows(rows: Sequence[tuple[str, str]]) -> None:
+    """Two columns; folded on a terminal, one line a row for a pipe."""
+    if not sys.stdout.isatty():
+        width = max((len(name) for name, _ in rows), default=0)
+        for name, text in rows:
+            click.echo(f"{name:<{width}}  {text}".rstrip())
+        return
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for row in rows:
+        table.add_row(*map(escape, row))
+    Console(highlight=False).print(table)
+
+
+def _summary(attributes: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Size, step, speed and wall times of a run."""
+    return [
+        (words, form.format(attributes[key])) for key, (words, form) in SUMMARY.items() if key in attributes
+    ]
+
+
+@contextmanager
+def _progress(console: Console, name: str) -> Iterator[Callable[[float, float], None]]:
+    """A bar with simulated time, ETA and real-time factor, as the callback of a run."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.2f} of {task.total:.2f} s"),
+        TextColumn("ETA"),
+        TimeRemainingColumn(),
+        TextColumn("RTF {task.fields[factor]:.2f}"),
+    )
+    with Progress(*columns, console=console, transient=not console.is_terminal) as bar:
+        task = bar.add_task(name, total=0.0, factor=0.0, start=False)
+        clock: list[float] = []  # the time of the first call: set-up is not part of the factor
+
+        def update(simulated_time: float, end_time: float) -> None:
+            if not clock:
+                clock.extend((time.perf_counter(), simulated_time))
+                bar.start_task(task)
+            elapsed = time.perf_counter() - clock[0]
+            factor = (simulated_time - clock[1]) / elapsed if elapsed > 0.0 else 0.0
+            bar.update(task, completed=simulated_time, total=end_time, factor=factor)
+
+        yield update
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """Let a termination signal unwind the stack, so that no half file is left behind."""
+
+    def leave(number: int, frame: object) -> None:
+        raise SystemExit(128 + number)
+
+    previous = signal.signal(signal.SIGTERM, leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, previous)

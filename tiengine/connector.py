@@ -1,0 +1,220 @@
+"""Bodies and the springs, dampers and stops between their points (MODEL §4).
+
+A vehicle is a list of rigid bodies with the motions (y, z, roll, pitch, yaw) and of connectors. A connector
+joins a point of body ``a`` to a point of body ``b``. Points are given in the vehicle: x forward from its
+centre, y right from the centre line, height above the rail. With (X, Y, Z) the same point seen from the
+body's centre of gravity (Z down), it moves by
+
+    u_x = Z pitch - Y yaw,   u_y = y + X yaw - Z roll,   u_z = z - X pitch + Y roll;
+
+an elongation is the motion of ``a`` less that of ``b``.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import model_validator
+
+from tiengine.quantity import Params, Q
+
+__all__ = [
+    "Body",
+    "Damper",
+    "Direction",
+    "Joint",
+    "Spring",
+    "Stop",
+    "check_damper",
+    "check_stop",
+    "end_motion",
+    "prolonged",
+]
+
+Length = Annotated[float, Q("m")]
+Point = tuple[Length, Length, Length]
+Stiffness = Annotated[float, Q("N/m", ge=0)]
+Damping = Annotated[float, Q("N s/m", ge=0)]
+RollStiffness = Annotated[float, Q("N m/rad", ge=0)]
+Forces = tuple[Annotated[float, Q("N", ge=0)], ...]
+Direction = Literal["x", "y", "z"]
+
+
+class Body(Params):
+    """Rigid body with its principal axes along x, y, z; a wheelset spins."""
+
+    name: str
+    mass: Annotated[float, Q("kg", gt=0)]
+    Jx: Annotated[float, Q("kg m^2", "roll inertia", gt=0)]
+    Jy: Annotated[float, Q("kg m^2", "pitch inertia; of a wheelset its spin inertia", gt=0)]
+    Jz: Annotated[float, Q("kg m^2", "yaw inertia", gt=0)]
+    x: Annotated[float, Q("m", "centre of gravity, forward of the vehicle's centre")] = 0.0
+    y: Annotated[float, Q("m", "centre of gravity, right of the centre line")] = 0.0
+    height: Annotated[float, Q("m", "centre of gravity above the rail", ge=0)]
+    wheelset: bool = False
+
+    def local(self, point: Point) -> tuple[float, float, float]:
+        """(X, Y, Z) from the centre of gravity to a point of the vehicle (x, y, height) [m]."""
+        return point[0] - self.x, point[1] - self.y, self.height - point[2]
+
+
+class Joint(Params):
+    """What every connector has: two bodies and a point of each (x, y, height above the rail) [m]."""
+
+    name: str = ""
+    a: str
+    b: str
+    point_a: Point
+    point_b: Point
+
+
+class Spring(Joint):
+    """Linear spring and damper in parallel, in the three directions, with bending and torsion."""
+
+    kx: Stiffness = 0.0
+    ky: Stiffness = 0.0
+    kz: Stiffness = 0.0
+    cx: Damping = 0.0
+    cy: Damping = 0.0
+    cz: Damping = 0.0
+    k_roll: RollStiffness = 0.0
+    k_pitch: RollStiffness = 0.0
+    k_yaw: RollStiffness = 0.0
+
+    @property
+    def stiffness(self) -> NDArray[np.float64]:
+        """Stiffness of (u_x, u_y, u_z, roll, pitch, yaw) [N/m, N m/rad], shape (6,)."""
+        return np.array([self.kx, self.ky, self.kz, self.k_roll, self.k_pitch, self.k_yaw])
+
+    @property
+    def damping(self) -> NDArray[np.float64]:
+        """Damping of the same [N s/m], shape (6,)."""
+        return np.array([self.cx, self.cy, self.cz, 0.0, 0.0, 0.0])
+
+
+class Damper(Joint):
+    """Damper along one direction, odd in its rate, optionally in series with a spring.
+
+    Either slopes ``c[i]`` from the rates ``v[i]`` on (``v[0] = 0``), or points (v, F) from (0, 0) on. Beyond
+    the last point the last slope goes on: repeat the last force to saturate.
+    """
+
+    direction: Direction
+    v: tuple[Annotated[float, Q("m/s", ge=0)], ...]
+    c: tuple[Damping, ...] = ()
+    F: Forces = ()
+    k_series: Stiffness = 0.0
+
+    @model_validator(mode="after")
+    def _check(self) -> Damper:
+        check_damper(self.v, self.c, self.F)
+        return self
+
+    @property
+    def table(self) -> NDArray[np.float64]:
+        """Points (rate [m/s], force [N]) for rates from zero on, shape (n, 2), n >= 2."""
+        if self.F:
+            return np.column_stack([self.v, self.F])
+        v = np.append(self.v, 2.0 * self.v[-1] or 1.0)
+        return np.column_stack([v, np.append(0.0, np.cumsum(np.diff(v) * self.c))])
+
+
+class Stop(Joint):
+    """Spring along one direction, odd in its elongation, by points (x, F); no force below a gap x[0] > 0.
+
+    Beyond the last point the last slope goes on.
+    """
+
+    direction: Direction
+    x: tuple[Annotated[float, Q("m", ge=0)], ...]
+    F: Forces
+
+    @model_validator(mode="after")
+    def _check(self) -> Stop:
+        check_stop(self.x, self.F)
+        return self
+
+    @property
+    def table(self) -> NDArray[np.float64]:
+        """Points (elongation [m], force [N]) for elongations from zero on, shape (n, 2), n >= 2."""
+        points = np.column_stack([self.x, self.F])
+        return points if self.x[0] == 0.0 else np.vstack([np.zeros((1, 2)), points])
+
+
+def check_damper(v: tuple[float, ...], c: tuple[float, ...], F: tuple[float, ...]) -> None:
+    """Refuse a damper table that is not a rising one of slopes or of points from zero on.
+
+    Args:
+        v: Rates [m/s].
+        c: Slopes from those rates on [N s/m], or empty.
+        F: Forces at those rates [N], or empty.
+
+    Raises:
+        ValueError: The rule that is broken.
+    """
+    if bool(c) == bool(F):
+        raise ValueError("must have either slopes c or forces F")
+    _check_points("v", v, "F" if F else "c", F or c)
+    if v[0] != 0.0 or (F and (F[0] != 0.0 or len(F) < 2)):
+        raise ValueError("v must start at zero, a table of forces at (0, 0) with a second point")
+
+
+def check_stop(x: tuple[float, ...], F: tuple[float, ...]) -> None:
+    """Refuse a stop's table that is not a rising one from zero force on.
+
+    Args:
+        x: Elongations [m].
+        F: Forces [N].
+
+    Raises:
+        ValueError: The rule that is broken.
+    """
+    _check_points("x", x, "F", F)
+    if len(x) < 2 or F[0] != 0.0:
+        raise ValueError("must have two points or more, the first of zero force")
+
+
+def _check_points(key: str, values: tuple[float, ...], other: str, others: tuple[float, ...]) -> None:
+    """Refuse tables of unequal length or whose abscissae do not rise."""
+    if not values or len(values) != len(others):
+        raise ValueError(f"{key} and {other} must have the same length, one or more")
+    if any(later <= earlier for earlier, later in pairwise(values)):
+        raise ValueError(f"{key} must rise from point to point")
+
+
+def prolonged(table: NDArray[np.float64], points: int) -> NDArray[np.float64]:
+    """A force table with more points on the line of its last segment.
+
+    Args:
+        table: Points (abscissa, force), shape (n, 2), n >= 2.
+        points: Wanted points, at least n.
+
+    Returns:
+        The same curve, shape (points, 2).
+    """
+    step = table[-1] - table[-2]
+    more = np.arange(1, points - len(table) + 1)[:, None]
+    return np.vstack([table, table[-1] + more * step])
+
+
+def end_motion(body: Body, point: Point) -> NDArray[np.float64]:
+    """Motion of a point of a body, its longitudinal motion included.
+
+    A wheelset's pitch is the perturbation of its spin; axle boxes do not follow it, so its column is zero.
+
+    Args:
+        body: The body.
+        point: (x, y, height) in the vehicle [m].
+
+    Returns:
+        Rows (u_x, u_y, u_z, roll, pitch, yaw), columns the body's (x, y, z, roll, pitch, yaw), shape (6, 6).
+    """
+    X, Y, Z = body.local(point)
+    motion = np.eye(6)
+    motion[:3, 3:] = [[0.0, Z, -Y], [-Z, 0.0, X], [Y, -X, 0.0]]
+    if body.wheelset:
+        motion[:, 4] = 0.0
+    return motion

@@ -1,0 +1,312 @@
+"""Track irregularity as a function of chainage (MODEL §6).
+
+Channels, in this order: vertical z_v [m], alignment y_a [m], cross level theta [rad], gauge g [m], then their
+slopes by chainage. With sigma = -1 on the left and +1 on the right, the railheads lie at
+z = z_v + sigma b_i theta and y = y_a + sigma g/2, b_i = 0.75 m.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationInfo, field_validator
+
+from tiengine.given_track import (
+    FunctionTrack,
+    MeasuredTrack,
+    UserFunction,
+    function_spline,
+    read_series,
+    smooth_step,
+)
+from tiengine.presets import nearest
+from tiengine.quantity import InputError, Params, Q
+from tiengine.realisation import BlockSpline, noise_spline
+from tiengine.spectrum import (
+    CHANNELS,
+    Density,
+    contact_filter,
+    load_roughness,
+    load_spectrum,
+    spectrum_names,
+)
+
+__all__ = [
+    "HALF_BASE",
+    "PATCH_HALF_LENGTH",
+    "Irregularity",
+    "IrregularityParams",
+    "at_wheels",
+    "from_function",
+    "make_irregularity",
+]
+
+Reals = NDArray[np.float64]
+
+HALF_BASE = 0.75
+"""b_i [m]: half the distance over which the cross level is an angle."""
+
+PATCH_HALF_LENGTH = 6e-3
+"""Half length of the contact patch along the rail [m] in the filter of short waves (6 to 7 mm at 70 kN)."""
+
+_ROUGHNESS_BLOCK = 64.0  # m, half a block at least: a train then lies in a few blocks, not hundreds
+_MOST_BANDWIDTH = 1e4  # longest over shortest wave; a block then takes 40 MB
+
+
+class IrregularityParams(Params):
+    """Which irregularity a track has; a ``file`` takes the place of the ``spectrum``.
+
+    ``short_wave`` adds the ISO 3095 limit to the vertical of each rail, from its longest band (0.45 m) or
+    ``wavelength_min``, whichever is shorter, down to ``short_wave_min``.
+    """
+
+    spectrum: str = "german_low"
+    seed: Annotated[int, Q("-", "names the realisation", ge=0, le=2**63 - 1)] = 1
+    wavelength_min: Annotated[float, Q("m", "shortest wave of the spectrum", gt=0, le=1e4)] = 1.0
+    wavelength_max: Annotated[
+        float, Q("m", "longest wave of the spectrum", gt=0, le=1e4, validate_default=True)
+    ] = 120.0
+    two_sided: bool = False
+    scale: Annotated[float, Q("-", "factor on all amplitudes", ge=0)] = 1.0
+    percentile: Annotated[float | None, Q("-", "of the Chinese spectrum; 0.632: mean", gt=0, lt=1)] = None
+    short_wave: bool = False
+    short_wave_min: Annotated[
+        float, Q("m", "shortest wave of the rail roughness", gt=0, validate_default=True)
+    ] = 0.08
+    taper: Annotated[float, Q("m", "length over which the irregularity begins", gt=0)] = 30.0
+    file: str | None = None
+    cross_level_rolls_rails: bool = True
+
+    @field_validator("spectrum")
+    @classmethod
+    def _is_known(cls, spectrum: str) -> str:
+        known = (*spectrum_names(), "none")
+        if spectrum not in known:
+            raise ValueError(f"unknown{nearest(spectrum, known)}")
+        return spectrum
+
+    @field_validator("wavelength_max")
+    @classmethod
+    def _is_longer(cls, wavelength_max: float, info: ValidationInfo) -> float:
+        shortest = info.data.get("wavelength_min", 0.0)
+        if wavelength_max <= shortest:
+            raise ValueError(f"must be > wavelength_min = {shortest:g}")
+        if shortest and wavelength_max > _MOST_BANDWIDTH * shortest:
+            raise ValueError(
+                f"must be <= {_MOST_BANDWIDTH:g} wavelength_min = {_MOST_BANDWIDTH * shortest:g}"
+            )
+        return wavelength_max
+
+    @field_validator("percentile")
+    @classmethod
+    def _has_percentiles(cls, percentile: float | None, info: ValidationInfo) -> float | None:
+        if percentile is not None and info.data.get("spectrum", "none") != "none":
+            load_spectrum(info.data["spectrum"]).mean_factor(percentile)
+        return percentile
+
+    @field_validator("short_wave_min")
+    @classmethod
+    def _is_within_limit(cls, short_wave_min: float, info: ValidationInfo) -> float:
+        low, high = load_roughness().shortest, _longest_roughness(info.data.get("wavelength_min", np.inf))
+        if info.data.get("short_wave", False) and not low <= short_wave_min < high:
+            raise ValueError(f"must be >= {low:.4g} and < {high:.4g}")
+        return short_wave_min
+
+    @property
+    def short_wave_max(self) -> float:
+        """Longest wave of the rail roughness [m]."""
+        return _longest_roughness(self.wavelength_min)
+
+    @property
+    def shortest_wavelength(self) -> float:
+        """Shortest wave made from spectra [m]; infinite where there is none."""
+        track = self.wavelength_min if self.spectrum != "none" and self.file is None else np.inf
+        return min(track, self.short_wave_min if self.short_wave else np.inf)
+
+
+def _longest_roughness(wavelength_min: float) -> float:
+    """Longest wave of the limit [m], or where the spectrum of the track begins."""
+    return min(wavelength_min, load_roughness().longest)
+
+
+class _Track(Protocol):
+    """Part of a track: values and slopes of its channels at chainages."""
+
+    def evaluate(self, x: Reals) -> tuple[Reals, Reals]: ...
+
+
+class _Roughness:
+    """Roughness of the two railheads, independent of each other, as vertical and cross level."""
+
+    def __init__(self, rails: BlockSpline) -> None:
+        self._rails = rails
+
+    def evaluate(self, x: Reals) -> tuple[Reals, Reals]:
+        """Values and slopes of the four channels, each of shape (n, 4)."""
+        value, slope = self._rails.evaluate(x)
+        return _from_rails(value), _from_rails(slope)
+
+
+def _from_rails(z: Reals) -> Reals:
+    """Four channels of heights of the left and right railhead, (n, 2) to (n, 4)."""
+    channels = np.zeros((len(z), len(CHANNELS)))
+    channels[:, 0] = 0.5 * (z[:, 0] + z[:, 1])
+    channels[:, 2] = (z[:, 1] - z[:, 0]) / (2.0 * HALF_BASE)
+    return channels
+
+
+class Irregularity:
+    """Irregularity at any chainage; build it with :func:`make_irregularity` or :func:`from_function`."""
+
+    def __init__(self, parts: list[_Track], taper_start: float, taper: float, shortest: float) -> None:
+        """Add up parts.
+
+        Args:
+            parts: What is added.
+            taper_start: Chainage before which the track is smooth [m].
+            taper: Length over which the irregularity begins [m].
+            shortest: Shortest wavelength of the parts [m]; infinite where not known.
+        """
+        self._parts = parts
+        self.taper_start, self.taper, self.shortest_wavelength = taper_start, taper, shortest
+
+    def sample(self, x: Reals) -> Reals:
+        """Irregularity at chainages; the same bits for a chainage in any array and any order.
+
+        Args:
+            x: Chainages [m], any shape, any order, any sign.
+
+        Returns:
+            z_v, y_a, theta, g [m, m, rad, m] and their slopes [-, -, rad/m, -], shape (..., 8).
+
+        Raises:
+            InputError: A chainage is not finite.
+        """
+        chainage = np.asarray(x, dtype=np.float64)
+        if not np.isfinite(chainage).all():
+            raise InputError("irregularity: chainage must be finite")
+        flat = chainage.reshape(-1)
+        out = np.zeros((flat.size, 2 * len(CHANNELS)))
+        value, slope = out[:, : len(CHANNELS)], out[:, len(CHANNELS) :]
+        for part in self._parts:
+            v, s = part.evaluate(flat)
+            value += v
+            slope += s
+        t = (flat - self.taper_start) / self.taper
+        if flat.size and t.min() < 1.0:
+            T, T_slope = smooth_step(t)
+            slope *= T[:, None]
+            slope += value * (T_slope / self.taper)[:, None]
+            value *= T[:, None]
+        return out.reshape(*chainage.shape, -1)
+
+    def check_step(self, speed: float, dt: float) -> None:
+        """Refuse waves that the time step cannot follow.
+
+        Args:
+            speed: Highest speed V [m/s].
+            dt: Time step [s].
+
+        Raises:
+            InputError: The shortest wavelength is below 8 V dt.
+        """
+        least = 8.0 * speed * dt
+        if self.shortest_wavelength < least:
+            raise InputError(
+                f"irregularity: shortest wavelength = {self.shortest_wavelength:g} m: "
+                f"must be >= 8 V dt = {least:.4g} m"
+            )
+
+
+def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregularity:
+    """Irregularity of a scenario: a file or else a spectrum, and the roughness below it.
+
+    Args:
+        params: What to make; a ``file`` takes the spectrum's place.
+        taper_start: Chainage where the irregularity begins [m], ahead of the leading wheel.
+
+    Raises:
+        InputError: The file breaks a rule.
+    """
+    parts: list[_Track] = []
+    shortest = params.shortest_wavelength
+    if params.file is not None:
+        series = read_series(params.file)
+        series[:, 1:] *= params.scale
+        measured = MeasuredTrack(series, params.taper)
+        parts.append(measured)
+        shortest = min(shortest, measured.shortest)
+    elif params.spectrum != "none":
+        band = (params.wavelength_min, params.wavelength_max)
+        parts.append(noise_spline(params.seed, range(4), _track_densities(params), band))
+    if params.short_wave:
+        roughness = load_roughness()
+
+        def felt(Omega: Reals) -> Reals:
+            return params.scale**2 * roughness.density(Omega) * contact_filter(Omega, PATCH_HALF_LENGTH)
+
+        band = (params.short_wave_min, params.short_wave_max)
+        rails = noise_spline(params.seed, (4, 5), (felt, felt), band, shortest_block=_ROUGHNESS_BLOCK)
+        parts.append(_Roughness(rails))
+    return Irregularity(parts, taper_start, params.taper, shortest)
+
+
+def _track_densities(params: IrregularityParams) -> list[Density]:
+    """Densities as realised: scaled, one- or two-sided, the rails' heights as the patch feels them."""
+    spectrum = load_spectrum(params.spectrum)
+    factor = params.scale**2 * (2.0 if params.two_sided else 1.0)
+    if params.percentile is not None:
+        factor *= spectrum.mean_factor(params.percentile)
+
+    def density(channel: str) -> Density:
+        a = PATCH_HALF_LENGTH if channel in ("vertical", "cross_level") else 0.0
+        return lambda Omega: factor * spectrum.density(channel, Omega) * contact_filter(Omega, a)
+
+    return [density(channel) for channel in CHANNELS]
+
+
+def from_function(
+    f: UserFunction,
+    *,
+    slopes: UserFunction | None = None,
+    taper_start: float,
+    taper: float = 30.0,
+    spacing: float = 0.05,
+) -> Irregularity:
+    """Irregularity given by a user's function.
+
+    Args:
+        f: Chainages (n,) to z_v, y_a, theta, g, each (n,) or a number.
+        slopes: The derivatives of f by x, in the same form. Without them f is replaced by the C2 spline
+            through its values at multiples of ``spacing``, with an error of (2 pi spacing/lambda)^4/384.
+        taper_start: Chainage where the irregularity begins [m].
+        taper: Length over which it begins [m].
+        spacing: Grid of the spline [m].
+
+    Raises:
+        InputError: ``taper`` or ``spacing`` is not positive; later, when sampled: f does not give four finite
+            series.
+    """
+    for name, value in (("taper", taper), ("spacing", spacing)):
+        if not value > 0.0:
+            raise InputError(f"irregularity.{name} = {value:g}: must be > 0")
+    track = FunctionTrack(f, slopes) if slopes is not None else function_spline(f, spacing)
+    return Irregularity([track], taper_start, taper, np.inf)
+
+
+def at_wheels(channels: Reals) -> Reals:
+    """Irregularity of the left and right railhead.
+
+    Args:
+        channels: Result of :meth:`Irregularity.sample`, shape (..., 8).
+
+    Returns:
+        z, y, z', y' of each side (0 left, 1 right), shape (..., 2, 4).
+    """
+    side = np.array([-1.0, 1.0])
+    z_v, y_a, theta, gauge, *slopes = np.moveaxis(channels, -1, 0)[..., None]
+    rails = [z_v + side * HALF_BASE * theta, y_a + side * 0.5 * gauge]
+    rails += [slopes[0] + side * HALF_BASE * slopes[2], slopes[1] + side * 0.5 * slopes[3]]
+    return np.stack(rails, axis=-1)

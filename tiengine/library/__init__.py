@@ -1,0 +1,1 @@
+"""Presets: TOML and profiles, each number with its source."""

@@ -1,0 +1,83 @@
+"""Changing single keys of a scenario: ``--set train.speed_kmh=300`` and its Python form."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from tiengine.presets import to_tuples
+from tiengine.quantity import InputError
+
+__all__ = ["Overrides", "apply_overrides", "parse_value"]
+
+Overrides = Mapping[str, Any] | Sequence[str]
+"""Either ``{"train.speed_kmh": 300.0}``, nested tables, or texts ``"train.speed_kmh=300"``."""
+
+
+def apply_overrides(tables: dict[str, Any], overrides: Overrides) -> dict[str, Any]:
+    """Set keys in the tables of a scenario.
+
+    A key may go on into a part that the scenario names: ``track.fastening.vertical_stiffness=5e7`` turns
+    ``"ACE2021"`` into ``{like = "ACE2021", vertical_stiffness = 5e7}``.
+
+    Args:
+        tables: Tables of the scenario; not changed.
+        overrides: What to set, later entries winning.
+
+    Returns:
+        New tables.
+
+    Raises:
+        InputError: A text without ``=``, or a key that goes on into a number.
+    """
+    for key, value in _pairs(overrides):
+        tables = _replaced(tables, key.split("."), value, key)
+    return tables
+
+
+def parse_value(text: str) -> Any:
+    """Value of a TOML text; a bare word that is not TOML is taken as a string.
+
+    Args:
+        text: ``300``, ``[1, 2]``, ``true``, ``{factor = 0.5}``, ``explicit``.
+    """
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text.strip()
+    return to_tuples(parsed["value"]) if list(parsed) == ["value"] else text
+
+
+def _pairs(overrides: Overrides, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys and values; nested tables change single keys and do not replace tables."""
+    if not isinstance(overrides, Mapping):
+        for text in (overrides,) if isinstance(overrides, str) else overrides:
+            key, equals, value = text.partition("=")
+            if not equals or not key.strip():
+                raise InputError(f"--set {text!r}: must be KEY=VALUE, such as train.speed_kmh=300")
+            yield key.strip(), parse_value(value)
+        return
+    for key, value in overrides.items():
+        if isinstance(value, Mapping) and value:
+            yield from _pairs(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", to_tuples(value)
+
+
+def _replaced(node: Any, path: list[str], value: Any, key: str) -> Any:
+    """A copy of ``node`` with the value at ``path`` replaced."""
+    if not path:
+        return value
+    head, rest = path[0], path[1:]
+    if isinstance(node, dict):
+        return {**node, head: _replaced(node.get(head, {}), rest, value, key)}
+    if isinstance(node, str):  # the name of a preset, of which one key is changed
+        return {"like": node, head: _replaced({}, rest, value, key)}
+    if isinstance(node, tuple):
+        if not head.isdecimal() or int(head) >= len(node):
+            raise InputError(f"--set {key}: {head!r} must be an index between 0 and {len(node) - 1}")
+        return tuple(
+            _replaced(item, rest, value, key) if i == int(head) else item for i, item in enumerate(node)
+        )
+    raise InputError(f"--set {key}: {head!r} lies below a value that is not a table ({node!r})")

@@ -1,0 +1,243 @@
+"""The parts of a scenario: from names, paths and tables to vehicles, rail, slab, fastening and profiles.
+
+A named part is looked up among the scenario's own presets first, then in the library, or read from its path.
+A profile's table holds ``points``, the text of its two columns (y and z in mm), so that a resolved scenario
+needs no other file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field
+
+from tiengine.fastening import Fastening
+from tiengine.mortar import Mortar
+from tiengine.presets import KINDS, find_preset, load_toml, nearest, read_text
+from tiengine.profile import ROUNDING_LENGTH, Profile
+from tiengine.quantity import InputError, Params, Q, build
+from tiengine.rail import Rail
+from tiengine.slab import Slab
+from tiengine.vehicle import Vehicle, vehicle_from_table
+
+if TYPE_CHECKING:
+    from tiengine.scenario import Track, Train
+
+__all__ = ["Part", "Parts", "Presets", "build_parts", "collect_presets"]
+
+
+def _check_part(value: Any) -> Any:
+    if not isinstance(value, str | dict) or not value:
+        raise ValueError("must be the name of a preset, the path of a file, or a table")
+    return value
+
+
+Part = Annotated[str | dict[str, Any], BeforeValidator(_check_part)]
+"""Name of a preset, path of a file, or a table, which may start from a preset: ``{like = "CHN60", ...}``."""
+
+Presets = dict[str, dict[str, dict[str, Any]]]
+"""Tables by kind and name."""
+
+
+class ProfilePoints(Params):
+    """A wheel's or a rail's profile as a table."""
+
+    name: str = "profile"
+    source: str = ""
+    points: Annotated[str, Field(description="y and z in mm, a pair a line")]
+    has_cant: bool = False
+    smoothing: Annotated[float, Q("m", "length of the smoothing spline", ge=0, le=5e-3)] = ROUNDING_LENGTH
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What a scenario's names stand for.
+
+    Attributes:
+        vehicles: The vehicles, the leading one first.
+        centres: Vehicle centres relative to the first's [m], shape (vehicles,); 0, then negative.
+        wheel: Wheel profile.
+        rail: Section of the rail.
+        rail_profile: Profile of the railhead, upright unless it says otherwise.
+        slab: Slab.
+        mortar: Its bed.
+        fastening: Fastening.
+    """
+
+    vehicles: tuple[Vehicle, ...]
+    centres: NDArray[np.float64]
+    wheel: Profile
+    rail: Rail
+    rail_profile: Profile
+    slab: Slab
+    mortar: Mortar
+    fastening: Fastening
+
+    @property
+    def wheelset_positions(self) -> NDArray[np.float64]:
+        """Wheelsets relative to the first vehicle's centre, the leading one first [m], shape (wheelsets,)."""
+        rows = [x + v.axle_positions for x, v in zip(self.centres, self.vehicles, strict=True)]
+        return np.concatenate(rows)
+
+    @property
+    def wheel_span(self) -> float:
+        """Distance between the outer wheelsets [m]."""
+        return float(np.ptp(self.wheelset_positions))
+
+
+def collect_presets(train: Train, track: Track, presets: Presets, folder: Path | None) -> Presets:
+    """Copy every preset that a scenario names into it.
+
+    Args:
+        train: Names vehicles and the wheel profile.
+        track: Names rail, rail profile, slab and fastening.
+        presets: Tables that the scenario brings; they are not looked up again.
+        folder: Where relative paths start.
+
+    Returns:
+        Tables by kind and name, complete.
+
+    Raises:
+        InputError: A name that is neither a preset nor a file; a kind that does not exist.
+    """
+    for kind in presets:
+        if kind not in KINDS:
+            raise InputError(f"presets.{kind}: unknown kind of preset{nearest(kind, KINDS)}")
+    found = {kind: dict(tables) for kind, tables in presets.items()}
+    for where, kind, part in _references(train, track):
+        name = part if isinstance(part, str) else part.get("like")
+        tables = found.setdefault(kind, {})
+        seen: set[Any] = set()
+        while name is not None:  # a preset may itself start from another one
+            if name in seen:
+                raise InputError(f"{where} = {name!r}: is like itself")
+            seen.add(name)
+            if name not in tables:
+                tables[name] = _read(where, kind, name, folder)
+            name = tables[name].get("like")
+    return found
+
+
+def build_parts(train: Train, track: Track, presets: Presets) -> Parts:
+    """Build and check every part.
+
+    Args:
+        train: The train's table.
+        track: The track's table.
+        presets: What :func:`collect_presets` returned; names it lacks are read from the library.
+
+    Returns:
+        The parts.
+
+    Raises:
+        InputError: The first value that breaks a rule, as ``train.vehicles[0].car.mass = -1: ...``.
+    """
+    presets = collect_presets(train, track, presets, None)
+    tables = {where: _resolved(kind, part, presets) for where, kind, part in _references(train, track)}
+    vehicles = []
+    for i in range(len(train.vehicles)):
+        table = tables[f"train.vehicles[{i}]"]
+        table.setdefault("name", "vehicle")
+        vehicles.append(vehicle_from_table(table, f"train.vehicles[{i}]"))
+    slab_table = tables["track.slab"]
+    bed = slab_table.pop("mortar", None)
+    if not isinstance(bed, dict):
+        raise InputError("track.slab.mortar: missing; a table of the bed's values is required")
+    mortar = build(Mortar, bed, "track.slab.mortar")
+    if track.mortar_no_tension:
+        mortar = mortar.model_copy(update={"no_tension": True})
+    return Parts(
+        vehicles=tuple(vehicles),
+        centres=_centres(vehicles, train),
+        wheel=_profile(tables["train.wheel_profile"], "train.wheel_profile", "wheel"),
+        rail=build(Rail, tables["track.rail"], "track.rail"),
+        rail_profile=_profile(tables["track.rail_profile"], "track.rail_profile", "rail"),
+        slab=build(Slab, slab_table, "track.slab"),
+        mortar=mortar,
+        fastening=build(Fastening, tables["track.fastening"], "track.fastening"),
+    )
+
+
+def _references(train: Train, track: Track) -> Iterator[tuple[str, str, str | dict[str, Any]]]:
+    """Key, kind and value of every part that a scenario refers to."""
+    for i, vehicle in enumerate(train.vehicles):
+        yield f"train.vehicles[{i}]", "vehicles", vehicle
+    yield "train.wheel_profile", "profiles", train.wheel_profile
+    yield "track.rail", "rails", track.rail
+    yield "track.rail_profile", "profiles", track.rail_profile
+    yield "track.slab", "slabs", track.slab
+    yield "track.fastening", "fastenings", track.fastening
+
+
+def _read(where: str, kind: str, name: Any, folder: Path | None) -> dict[str, Any]:
+    """Table of a preset or file."""
+    path = find_preset(kind, name, folder=folder, called=where)
+    if path.suffix == ".toml":
+        return load_toml(path)
+    lines = (line.split("#")[0].strip() for line in read_text(path).splitlines())
+    return {"name": path.stem, "points": "\n".join(line for line in lines if line)}
+
+
+def _resolved(kind: str, part: str | dict[str, Any], presets: Presets) -> dict[str, Any]:
+    """Complete table of a part: its own keys over those of the preset it starts from."""
+    chain: list[Mapping[str, Any]] = []
+    current: str | Mapping[str, Any] | None = part
+    while current is not None:
+        if isinstance(current, str):
+            current = presets[kind][current]
+        chain.append({key: value for key, value in current.items() if key != "like"})
+        current = current.get("like")
+    table: dict[str, Any] = {}
+    for layer in reversed(chain):
+        table = _merged(table, layer)
+    return table
+
+
+def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """``base`` with the keys of ``over``, table by table."""
+    merged = dict(base)
+    for key, value in over.items():
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        merged[key] = _merged(merged[key], value) if both else value
+    return merged
+
+
+def _profile(table: dict[str, Any], where: str, kind: Literal["wheel", "rail"]) -> Profile:
+    given = build(ProfilePoints, table, where)
+    rows = [line.replace(",", " ").replace(";", " ").split() for line in given.points.strip().splitlines()]
+    try:
+        points = np.array([[float(y), float(z)] for y, z in rows]).reshape(-1, 2) * 1e-3
+    except ValueError:
+        raise InputError(f"{where}: every line of its points must hold two numbers, y and z in mm") from None
+    return Profile(
+        given.name, kind, points[:, 0].copy(), points[:, 1].copy(), given.has_cant, given.smoothing
+    )
+
+
+def _centres(vehicles: list[Vehicle], train: Train) -> NDArray[np.float64]:
+    """Vehicle centres relative to the first's [m]."""
+    pitch = train.coupler_pitch
+    couplings = len(vehicles) - 1
+    if pitch is None:
+        gaps = [(a.length + b.length) / 2.0 for a, b in pairwise(vehicles)]
+    elif isinstance(pitch, tuple):
+        gaps = list(pitch)
+    else:
+        gaps = [pitch] * couplings
+    if len(gaps) != couplings:
+        raise InputError(
+            f"train.coupler_pitch = {list(gaps)}: must be one number or {couplings}, one a coupling"
+        )
+    centres = 0.0 - np.concatenate([[0.0], np.cumsum(gaps)])
+    for i in range(couplings):
+        least = vehicles[i + 1].axle_positions[0] - vehicles[i].axle_positions[-1]
+        if not least < gaps[i] < 1000.0:
+            rule = f"must be between {least:g} m, where the wheelsets of neighbours meet, and 1000 m"
+            raise InputError(f"train.coupler_pitch = {gaps[i]:g}: {rule}")
+    return centres

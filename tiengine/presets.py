@@ -1,0 +1,185 @@
+"""Finding presets of the library, by name or by path, and reading TOML.
+
+Every kind of part has a folder ``tiengine/library/<kind>/`` with one file a preset. A preset is asked for by
+its bare name (``"CHN60"``) or by the path of a file of the same form (``"my_rail.toml"``).
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from importlib import resources
+from itertools import takewhile
+from pathlib import Path
+from typing import Any
+
+from tiengine.quantity import InputError
+
+__all__ = [
+    "KINDS",
+    "find_preset",
+    "load_toml",
+    "nearest",
+    "preset_names",
+    "preset_source",
+    "read_text",
+    "to_tuples",
+]
+
+KINDS = ("vehicles", "rails", "slabs", "fastenings", "profiles", "irregularity", "scenarios")
+"""Folders of the library."""
+
+_SUFFIXES = {"profiles": (".csv",)}  # every other kind is TOML
+
+
+def library_folder(kind: str) -> Path:
+    """Folder of the presets of one kind.
+
+    Args:
+        kind: One of :data:`KINDS`.
+
+    Returns:
+        Path inside the installed package (the package is always installed as plain files).
+    """
+    if kind not in KINDS:
+        raise InputError(f"preset kind = {kind!r}: unknown{nearest(kind, KINDS)}")
+    return Path(str(resources.files("tiengine.library"))) / kind
+
+
+def preset_names(kind: str) -> list[str]:
+    """Names of the library's presets of one kind, sorted.
+
+    Args:
+        kind: One of :data:`KINDS`.
+    """
+    folder = library_folder(kind)
+    suffixes = _SUFFIXES.get(kind, (".toml",))
+    return sorted(file.stem for file in folder.glob("*") if file.suffix in suffixes)
+
+
+def find_preset(
+    kind: str, name_or_path: str, suffix: str = "", folder: Path | None = None, called: str = ""
+) -> Path:
+    """File of a preset of the library or of the user.
+
+    A text with a slash or the kind's suffix is a path, anything else a name of the library.
+
+    Args:
+        kind: One of :data:`KINDS`.
+        name_or_path: ``"CHN60"``, or a path, absolute or relative to ``folder``.
+        suffix: Suffix of the library's files; the kind's own (``.toml``, profiles ``.csv``) if empty.
+        folder: Where relative paths start (the folder of the scenario file); the working directory if None.
+        called: What the messages call the thing (the scenario's key); the kind if empty.
+
+    Returns:
+        Path of an existing file.
+
+    Raises:
+        InputError: There is no such preset or file; the message names the nearest preset.
+    """
+    suffix = suffix or _SUFFIXES.get(kind, (".toml",))[0]
+    called = called or kind
+    if not isinstance(name_or_path, str) or not name_or_path:
+        raise InputError(f"{called} = {name_or_path!r}: must be the name of a preset or the path of a file")
+    library = library_folder(kind) / f"{name_or_path}{suffix}"
+    if _is_path(name_or_path, suffix):
+        path = (folder or Path()) / Path(name_or_path).expanduser()
+        if path.is_file():
+            return path
+        raise InputError(f"{called} = {name_or_path!r}: no such file ({path})")
+    if library.is_file():
+        return library
+    raise InputError(
+        f"{called} = {name_or_path!r}: no such preset{nearest(name_or_path, preset_names(kind))}"
+    )
+
+
+def _is_path(text: str, suffix: str) -> bool:
+    """Whether a text means a file rather than a preset (names hold neither slashes nor known suffixes)."""
+    return (
+        "/" in text or "\\" in text or Path(text).suffix.lower() in {suffix, ".toml", ".csv", ".txt", ".dat"}
+    )
+
+
+def nearest(name: str, known: list[str] | tuple[str, ...]) -> str:
+    """Tail of an error message: the nearest known name, or all of them.
+
+    Args:
+        name: What was asked for.
+        known: What there is.
+
+    Returns:
+        ``"; did you mean 'CHN60'?"``, ``"; known: CHN60, 60E1"`` or an empty text where nothing is known.
+    """
+    folded = {k.casefold(): k for k in known}
+    close = difflib.get_close_matches(name.casefold(), list(folded), n=1)
+    if close:
+        return f"; did you mean {folded[close[0]]!r}?"
+    return f"; known: {', '.join(known)}" if known else ""
+
+
+def load_toml(path: Path | str) -> dict[str, Any]:
+    """Read a TOML file; arrays become tuples, since parameters are frozen.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The tables, nested; numbers, texts, booleans and tuples.
+
+    Raises:
+        InputError: The file is missing, unreadable or not TOML; the message names file and line.
+    """
+    text = read_text(path)
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        message = str(error)
+        raise InputError(f"{path}: not valid TOML: {message[0].lower()}{message[1:]}") from None
+    return {key: to_tuples(value) for key, value in tables.items()}
+
+
+def read_text(path: Path | str) -> str:
+    """Contents of a text file.
+
+    Args:
+        path: The file.
+
+    Raises:
+        InputError: The file is missing, unreadable or not UTF-8.
+    """
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a UTF-8 text file") from None
+
+
+def to_tuples(value: Any) -> Any:
+    """The value with every list in it, at any depth, turned into a tuple."""
+    if isinstance(value, dict):
+        return {key: to_tuples(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(to_tuples(item) for item in value)
+    return value
+
+
+def preset_source(kind: str, name: str) -> str:
+    """Where the numbers of a preset come from, in one line.
+
+    Args:
+        kind: One of :data:`KINDS`.
+        name: Name of a preset of the library.
+
+    Returns:
+        The ``source`` key of a TOML preset, else the comment lines at its head.
+    """
+    path = find_preset(kind, name)
+    if path.suffix == ".toml":
+        source = load_toml(path).get("source", "")
+        if isinstance(source, str) and source:
+            return " ".join(source.split())
+    lines = read_text(path).splitlines()
+    head = [line.lstrip("# ") for line in takewhile(lambda line: line.startswith("#"), lines)]
+    return " ".join(head[:-1])  # the last one names the columns

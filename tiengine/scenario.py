@@ -1,0 +1,309 @@
+"""A scenario: what runs over which track, and how it is computed. TOML outside, frozen parameters inside.
+
+A part (vehicle, rail, slab, fastening, profile) is given by the name of a preset, by the path of a file
+(relative to the scenario's), or as a table; a table may start from a preset: ``{like = "ACE2021",
+vertical_stiffness = 5e7}``. Loading copies every preset used into ``presets``, so that the text written by
+:func:`to_toml` says all that was run and loads back equal wherever it is read.
+
+Speeds are in km/h at this edge only.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tomli_w
+from pydantic import BeforeValidator, Field
+
+from tiengine.channels import BODY, IRREGULARITY, WHEEL
+from tiengine.defects import FailedFastenings, MortarDefect, check_defects
+from tiengine.irregularity import IrregularityParams
+from tiengine.mortar import MortarVoid
+from tiengine.overrides import Overrides, apply_overrides
+from tiengine.parts import Part, Parts, build_parts, collect_presets
+from tiengine.presets import find_preset, load_toml, to_tuples
+from tiengine.quantity import InputError, Params, Q, build
+from tiengine.speed import SpeedProfile
+
+__all__ = ["Scenario", "check_wavelength", "load_scenario", "to_toml"]
+
+WINDOW_MARGIN = 8.0  # m beyond the outer wheels, either end, of the window "auto" (MODEL §1)
+WINDOW_MARGIN_LEAST = 2.0  # m: below this the window's fixed ends are felt under the outer wheels
+STEPS_PER_WAVE = 8.0  # the shortest wave must be passed in no fewer steps (MODEL §6)
+
+
+def _finite(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _number_or(word: str, unit: str, low: float, high: float) -> BeforeValidator:
+    """Either one word or a number in ``low .. high``."""
+
+    def check(value: Any) -> Any:
+        if value == word:
+            return value
+        if not _finite(value) or not low <= value <= high:
+            raise ValueError(f"must be {word!r} or a number between {low:g} and {high:g} {unit}")
+        return float(value)
+
+    return BeforeValidator(check)
+
+
+def _check_speed(value: Any) -> Any:
+    """A speed, or rows of chainage and speed."""
+    if isinstance(value, tuple):
+        if len(value) < 2 or not all(
+            isinstance(r, tuple) and len(r) == 2 and all(map(_finite, r)) for r in value
+        ):
+            raise ValueError("must be a number or two or more rows [chainage_m, km/h]")
+        if any(b[0] <= a[0] for a, b in pairwise(value)):
+            raise ValueError("chainages must increase from row to row")
+        speeds = [row[1] for row in value]
+    elif _finite(value):
+        speeds = [value]
+    else:
+        raise ValueError("must be a number or two or more rows [chainage_m, km/h]")
+    if not all(0.0 < speed <= 1000.0 for speed in speeds):
+        raise ValueError("must be greater than 0 and at most 1000 km/h")
+    return value
+
+
+def _channels(known: dict[str, Any]) -> BeforeValidator:
+    """Either "all" or names out of the known channels."""
+
+    def check(value: Any) -> Any:
+        if value == "all":
+            return tuple(known)
+        if not isinstance(value, tuple) or not all(isinstance(name, str) for name in value):
+            raise ValueError("must be 'all' or a list of channel names")
+        for name in value:
+            if name not in known:
+                raise ValueError(f"no such channel {name!r}; known: {', '.join(known)}")
+        return value
+
+    return BeforeValidator(check)
+
+
+class Train(Params):
+    """What runs and how fast."""
+
+    vehicles: Annotated[tuple[Part, ...], Field(min_length=1)]
+    coupler_pitch: float | tuple[float, ...] | None = Field(None, json_schema_extra={"unit": "m"})
+    speed_kmh: Annotated[float | tuple[tuple[float, float], ...], BeforeValidator(_check_speed)]
+    distance: Annotated[float, Q("m", "way of the train", gt=0, le=1e6)]
+    wheel_profile: Part = "LMA"
+    series_springs: bool = False
+
+    @property
+    def speed(self) -> SpeedProfile:
+        """Speed [m/s] over the chainage of the first vehicle's centre [m]."""
+        if isinstance(self.speed_kmh, tuple):
+            return SpeedProfile.table(*zip(*((x, v / 3.6) for x, v in self.speed_kmh), strict=True))
+        return SpeedProfile.constant(self.speed_kmh / 3.6)
+
+
+class Track(Params):
+    """The track, its contact with the wheel, and its defects."""
+
+    rail: Part = "CHN60"
+    rail_profile: Part = "CHN60"
+    slab: Part = "CRTS_III"
+    fastening: Part = "ACE2021"
+    friction: Annotated[float, Q("-", "coefficient of friction", gt=0, le=1)] = 0.3
+    gauge: Annotated[float, Q("m", ge=0.6, le=2.0)] = 1.435
+    gauge_depth: Annotated[
+        float, Q("m", "below the top of the rail, where gauge is measured", gt=0, le=0.03)
+    ] = 0.016
+    cant: Annotated[float, Q("-", "inward inclination of the rail", ge=0, le=0.1)] = 0.025
+    mortar_no_tension: bool = False
+    failed_fastenings: tuple[FailedFastenings, ...] = ()
+    mortar_voids: tuple[MortarDefect, ...] = ()
+
+
+class Contact(Params):
+    """How wheel and rail touch."""
+
+    hertz: Literal["exact", "zhai_worn", "zhai_cone"] = "exact"
+    smoothing: Annotated[float, Q("m", "Gaussian in the lateral shift", ge=0, le=2e-3)] = 1e-4
+    cross_level_rolls_rails: bool = True
+
+
+class Numerics(Params):
+    """How it is computed."""
+
+    modes_per_metre: Annotated[
+        float, Q("1/m", "trial functions per field and metre of window", ge=0.2, le=20)
+    ] = 2.0
+    window: Annotated[float | Literal["auto"], _number_or("auto", "m", 1.0, 2000.0)] = "auto"
+    time_step: Annotated[float | Literal["auto"], _number_or("auto", "s", 1e-6, 1e-3)] = "auto"
+    passes: Annotated[int, Q("-", "passes of the explicit half per step", ge=1, le=20)] = 2
+    start: Literal["equilibrium", "zero"] = "equilibrium"
+    mortar: Literal["implicit", "explicit"] = "implicit"
+    slab_count: Literal["cover", "paper"] = "cover"
+    threads: Annotated[int, Q("-", ge=1, le=1024)] = 1
+
+    def modes(self, window: float) -> int:
+        """Trial functions of each rail field in a window of the given length [m]."""
+        return max(1, round(self.modes_per_metre * window))
+
+
+class Output(Params):
+    """What is written, and how often; intervals are rounded to whole steps."""
+
+    wheel_interval: Annotated[float | Literal["step"], _number_or("step", "s", 1e-6, 10.0)] = "step"
+    body_interval: Annotated[float | Literal["step"], _number_or("step", "s", 1e-6, 10.0)] = 1e-3
+    wheel_channels: Annotated[tuple[str, ...], _channels(WHEEL)] = tuple(WHEEL)
+    body_channels: Annotated[tuple[str, ...], _channels(BODY)] = tuple(BODY)
+    irregularity_channels: Annotated[tuple[str, ...], _channels(IRREGULARITY)] = tuple(IRREGULARITY)
+    precision: Literal["single", "double"] = "single"
+    run_in: Annotated[float, Q("m", "way that statistics leave out", ge=0)] = 50.0
+
+
+class Ensemble(Params):
+    """Many trains at once; reserved."""
+
+    size: Annotated[int, Field(ge=1)] = 1
+    seeds: tuple[int, ...] = ()
+    vary: tuple[str, ...] = ()
+
+
+class Scenario(Params):
+    """All that a run needs to know.
+
+    Attributes:
+        presets: Tables of the presets used, by kind and name; they come before the library's.
+    """
+
+    name: str = "unnamed"
+    source: str = ""
+    train: Train
+    track: Track = Track()
+    irregularity: IrregularityParams = IrregularityParams()
+    contact: Contact = Contact()
+    numerics: Numerics = Numerics()
+    output: Output = Output()
+    ensemble: Ensemble = Ensemble()
+    presets: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
+
+    @cached_property
+    def parts(self) -> Parts:
+        """The parts that the scenario names, built and checked once."""
+        return build_parts(self.train, self.track, self.presets)
+
+    @property
+    def mortar_voids(self) -> tuple[MortarVoid, ...]:
+        """Voids of the whole track, as the slab's matrices want them."""
+        return tuple(void.rectangle for void in self.track.mortar_voids)
+
+    @cached_property
+    def window_length(self) -> float:
+        """Length of the moving window [m]."""
+        if self.numerics.window != "auto":
+            return float(self.numerics.window)
+        return self.parts.wheel_span + 2.0 * WINDOW_MARGIN
+
+    @cached_property
+    def modes(self) -> int:
+        """Trial functions of each rail field."""
+        return self.numerics.modes(self.window_length)
+
+
+def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Overrides = ()) -> Scenario:
+    """Read a scenario, change keys, check everything.
+
+    Args:
+        source: Name of a built-in scenario, path of a TOML file, tables, or a scenario.
+        overrides: ``{"train.speed_kmh": 300.0}`` or ``["train.speed_kmh=300"]`` (:mod:`tiengine.overrides`).
+
+    Returns:
+        The scenario with its presets copied into it and its parts built.
+
+    Raises:
+        InputError: The first thing that breaks a rule: key, value, rule.
+    """
+    folder = None
+    if isinstance(source, Scenario):
+        tables = to_tuples(source.model_dump(exclude_none=True))
+    elif isinstance(source, dict):
+        tables = to_tuples(source)
+    else:
+        path = find_preset("scenarios", str(source), called="scenario")
+        folder, tables = path.parent, load_toml(path)
+        tables.setdefault("name", path.stem)
+    tables = _absolute(apply_overrides(tables, overrides), folder)
+    scenario = build(Scenario, tables)
+    presets = collect_presets(scenario.train, scenario.track, scenario.presets, folder)
+    scenario = scenario.model_copy(update={"presets": presets})
+    _check(scenario)
+    return scenario
+
+
+def _absolute(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+    """The tables with the path of a measured irregularity made absolute, since it is read at every run."""
+    irregularity = tables.get("irregularity")
+    if not isinstance(irregularity, dict) or not isinstance(irregularity.get("file"), str):
+        return tables
+    path = ((folder or Path()) / Path(irregularity["file"]).expanduser()).resolve()
+    return {**tables, "irregularity": {**irregularity, "file": str(path)}}
+
+
+def to_toml(scenario: Scenario) -> str:
+    """The resolved scenario as TOML: every default, every preset used; loads back equal.
+
+    Args:
+        scenario: What :func:`load_scenario` returned.
+    """
+    return tomli_w.dumps(scenario.model_dump(mode="python", exclude_none=True), multiline_strings=True)
+
+
+def _check(scenario: Scenario) -> None:
+    """Rules that join several keys."""
+    if scenario.ensemble.size != 1:
+        raise InputError(
+            f"ensemble.size = {scenario.ensemble.size}: must be 1; several trains at once are not offered yet"
+        )
+    parts, window = scenario.parts, scenario.window_length
+    least = parts.wheel_span + 2.0 * WINDOW_MARGIN_LEAST
+    if window < least:
+        raise InputError(
+            f"numerics.window = {window:g}: window shorter than the train; must be at least {least:g} m"
+            f" (wheels over {parts.wheel_span:g} m and {WINDOW_MARGIN_LEAST:g} m at either end)"
+        )
+    step = scenario.numerics.time_step
+    if step != "auto":
+        check_wavelength(scenario, float(step))
+    check_defects(
+        scenario.track.failed_fastenings,
+        scenario.track.mortar_voids,
+        end=scenario.train.distance + window,
+        slab=parts.slab,
+    )
+
+
+def check_wavelength(scenario: Scenario, step: float) -> None:
+    """Refuse irregularity that a step cannot follow.
+
+    Args:
+        scenario: Gives the speed and the shortest wave.
+        step: Time step [s].
+
+    Raises:
+        InputError: The shortest wave is passed in fewer than eight steps (MODEL §6).
+    """
+    irregularity = scenario.irregularity
+    shortest = {}
+    if irregularity.spectrum != "none" and irregularity.file is None:
+        shortest["wavelength_min"] = irregularity.wavelength_min
+    if irregularity.short_wave:
+        shortest["short_wave_min"] = irregularity.short_wave_min
+    least = STEPS_PER_WAVE * scenario.train.speed.fastest * step
+    for key, wavelength in shortest.items():
+        if wavelength < least:
+            raise InputError(
+                f"irregularity.{key} = {wavelength:g}: must be at least 8 V dt = {least:.4g} m"
+                f" at a time step of {step:g} s; choose a smaller step or a longer wave"
+            )
