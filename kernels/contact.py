@@ -69,7 +69,7 @@ def rail_coordinates(b: int, wheelset: int, rail: int, dims: Array, shape: Array
 
 
 @ti.func
-def stored_state(b: int, wheelset: int, side: int, contact: Array):
+def stored_state(b: int, wheelset: int, side: ti.template(), contact: Array):
     """Contact state of a wheel as the last evaluation left it."""
     state = ti.Vector.zero(ti.f64, wr.N_CONTACT)
     for m in ti.static(range(wr.N_CONTACT)):
@@ -78,73 +78,81 @@ def stored_state(b: int, wheelset: int, side: int, contact: Array):
 
 
 @ti.func
-def add_generalised(
-    b: int, wheelset: int, constants: Array, wheel: Array, contact: Array, force: Array, wheelset_force: Array,
-    rail_force: Array,
-):  # fmt: skip
-    """Generalised forces on wheelset and rails of the wheels' local forces."""
-    for m in ti.static(range(5)):
-        wheelset_force[b, wheelset, m] = 0.0
-    for side in range(2):
-        sigma = 2.0 * side - 1.0
-        state = stored_state(b, wheelset, side, contact)
-        on_wheelset, on_rail = wr.force_directions(
-            sigma, wheel[wheelset, 0], wheel[wheelset, 1], constants[at.ARM_HEAD], state
-        )
-        f = ti.Vector.zero(ti.f64, 4)
-        for m in ti.static(range(4)):
-            f[m] = force[b, wheelset, side, m]
-        q = on_wheelset @ f
-        r = on_rail @ f
-        for m in ti.static(range(5)):
-            wheelset_force[b, wheelset, m] = wheelset_force[b, wheelset, m] + q[m]
-        for m in ti.static(range(3)):
-            rail_force[b, wheelset, side, m] = r[m]
+def stored_rail(b: int, wheelset: int, side: ti.template(), rail: Array):
+    """Rail motion under a wheel: w, v, theta_x, slopes, rates at constant s."""
+    r = ti.Vector.zero(ti.f64, 9)
+    for m in ti.static(range(9)):
+        r[m] = rail[b, wheelset, side, m]
+    return r
 
 
 @ti.func
-def evaluate(
-    b: int, wheelset: int, side: int, V: float, irregularity: ti.template(), constants: Array, wheel: Array, dims: Array,
-    table: Array, x: ti.template(), dx: ti.template(), rail_compliance: Array, rail_free: Array, rail_force: Array, rail_before: Array,
-    contact_out: Array,
+def stored_force(b: int, wheelset: int, side: ti.template(), count: ti.template(), force: Array):
+    """The first ``count`` force components of a wheel."""
+    f = ti.Vector.zero(ti.f64, count)
+    for m in ti.static(range(count)):
+        f[m] = force[b, wheelset, side, m]
+    return f
+
+
+@ti.func
+def store(
+    b: int, wheelset: int, side: ti.template(), state: ti.template(), f: ti.template(), r: ti.template(),
+    contact_out: Array, force_out: Array, rail_force_out: Array,
 ):  # fmt: skip
-    """Contact state of one wheel at the end-of-step coordinates, stored and returned."""
-    r = ti.Vector.zero(ti.f64, 9)
-    for m in ti.static(range(9)):
-        r[m] = rail_free[b, wheelset, side, m]
+    """Leave a wheel's contact state, its local forces and its forces on the rail in memory."""
+    for m in ti.static(range(wr.N_CONTACT)):
+        contact_out[b, wheelset, side, m] = state[m]
+    for m in ti.static(range(4)):
+        force_out[b, wheelset, side, m] = f[m]
     for m in ti.static(range(3)):
+        rail_force_out[b, wheelset, side, m] = r[m]
+
+
+@ti.func
+def rail_at_end(wheelset: int, free: ti.template(), increment: ti.template(), constants: Array, compliance: Array):
+    """Rail motion under a wheel at the end of the step, from that without the change of the wheel's force."""
+    r = free
+    for m in ti.static(range(3)):
+        value, slope = 0.0, 0.0
         for k in ti.static(range(3)):
-            q = rail_force[b, wheelset, side, k] - rail_before[b, wheelset, side, k]
-            r[m] += constants[at.BETA_DT2] * rail_compliance[wheelset, 0, m, k] * q
-            r[3 + m] += constants[at.BETA_DT2] * rail_compliance[wheelset, 1, m, k] * q
-            r[6 + m] += constants[at.GAMMA_DT] * rail_compliance[wheelset, 0, m, k] * q
-    state = wr.contact_state(
-        2.0 * side - 1.0,
+            value += compliance[wheelset, 0, m, k] * increment[k]
+            slope += compliance[wheelset, 1, m, k] * increment[k]
+        r[m] += constants[at.BETA_DT2] * value
+        r[3 + m] += constants[at.BETA_DT2] * slope
+        r[6 + m] += constants[at.GAMMA_DT] * value
+    return r
+
+
+@ti.func
+def state_of(
+    side: ti.template(), V: float, r0: float, b0: float, x: ti.template(), dx: ti.template(), rail: ti.template(),
+    irregularity: ti.template(), rolls: int, table: Array, constants: Array,
+):  # fmt: skip
+    """Contact state of the left (0) or right (1) wheel."""
+    return wr.contact_state(
+        ti.static(2.0 * side - 1.0),
         V,
-        wheel[wheelset, 0],
-        wheel[wheelset, 1],
+        r0,
+        b0,
         x,
         dx,
-        ti.Vector([r[0], r[1], r[2]]),
-        ti.Vector([r[3], r[4], r[5]]),
-        ti.Vector([r[6], r[7], r[8]]),
+        ti.Vector([rail[0], rail[1], rail[2]]),
+        ti.Vector([rail[3], rail[4], rail[5]]),
+        ti.Vector([rail[6], rail[7], rail[8]]),
         irregularity,
-        dims[at.CROSS_LEVEL_ROLLS],
+        rolls,
         table,
         constants,
     )
-    for m in ti.static(range(wr.N_CONTACT)):
-        contact_out[b, wheelset, side, m] = state[m]
-    return state
 
 
 @ti.func
 def response(
-    row_side: int, column_side: int, wheelset: int, V: float, constants: Array, on_wheelset: ti.template(),
-    on_rail: ti.template(), column_wheelset: ti.template(), column_rail: ti.template(), cos_row: float,
-    wheelset_compliance: Array, rail_compliance: Array,
+    same: ti.template(), wheelset: int, V: float, constants: Array, on_wheelset: ti.template(), on_rail: ti.template(),
+    other: ti.template(), cos_row: float, wheelset_compliance: Array, rail_compliance: Array,
 ):  # fmt: skip
-    """W: change of (delta, xi_x, xi_y, xi_s) of one wheel by unit (N, Fx, Fy, Mz) of another of the wheelset.
+    """W: change of (delta, xi_x, xi_y, xi_s) of one wheel by unit (N, Fx, Fy, Mz) of itself (``same``) or of the other.
 
     For the Jacobian the diagonal of the wheelset's compliance is enough: the inertia dominates it.
     """
@@ -153,18 +161,18 @@ def response(
         for n in ti.static(range(4)):
             total = 0.0
             for k in ti.static(range(5)):
-                total += on_wheelset[k, m] * wheelset_compliance[wheelset, k, k] * column_wheelset[k, n]
-            if row_side == column_side:
-                total += on_rail[0, m] * rail_compliance[wheelset, 0, 0, 0] * column_rail[0, n]
+                total += on_wheelset[k, m] * wheelset_compliance[wheelset, k, k] * other[k, n]
+            if ti.static(same == 1):
+                total += on_rail[0, m] * rail_compliance[wheelset, 0, 0, 0] * on_rail[0, n]
                 for k in ti.static(range(1, 3)):
                     for l in ti.static(range(1, 3)):
-                        total += on_rail[k, m] * rail_compliance[wheelset, 0, k, l] * column_rail[l, n]
+                        total += on_rail[k, m] * rail_compliance[wheelset, 0, k, l] * on_rail[l, n]
             if ti.static(m == 0):
                 W[m, n] = -constants[at.BETA_DT2] * total  # a wheel pushed up penetrates less
             else:
                 W[m, n] = constants[at.GAMMA_DT] * total / V
     for n in ti.static(range(4)):  # yaw steers: -psi / cos gamma
-        W[2, n] -= constants[at.BETA_DT2] * wheelset_compliance[wheelset, 4, 4] * column_wheelset[4, n] / cos_row
+        W[2, n] -= constants[at.BETA_DT2] * wheelset_compliance[wheelset, 4, 4] * other[4, n] / cos_row
     return W
 
 
@@ -174,39 +182,50 @@ def solve_wheelset(
     table: Array, wheelset_compliance: Array, rail_compliance: Array, motion: Array, rail_free: Array, contact: Array,
     force: Array, wheelset_force: Array, rail_force: Array, wheelset_before: Array, rail_before: Array,
 ):  # fmt: skip
-    """Newton's method for the eight local forces of one wheelset; returns the number of iterations."""
+    """Newton's method for the eight local forces of one wheelset; returns the number of iterations.
+
+    Everything that changes from one iteration to the next is local: Taichi 1.7.4 takes a load with a literal index and a
+    store with a running one for different places and moves the load out of the loop.
+    """
     x_free = wheelset_coordinates(b, wheelset, dims, dof, at.U, motion)
     dx_free = wheelset_coordinates(b, wheelset, dims, dof, at.V, motion)
+    free_l, free_r = stored_rail(b, wheelset, 0, rail_free), stored_rail(b, wheelset, 1, rail_free)
+    before_l, before_r = stored_force(b, wheelset, 0, 3, rail_before), stored_force(b, wheelset, 1, 3, rail_before)
+    before = ti.Vector.zero(ti.f64, 5)
+    for m in ti.static(range(5)):
+        before[m] = wheelset_before[b, wheelset, m]
+    f_l, f_r = stored_force(b, wheelset, 0, 4, force), stored_force(b, wheelset, 1, 4, force)
+    left, right = stored_state(b, wheelset, 0, contact), stored_state(b, wheelset, 1, contact)
     r0, b0, h_r = wheel[wheelset, 0], wheel[wheelset, 1], constants[at.ARM_HEAD]
+    rolls = dims[at.CROSS_LEVEL_ROLLS]
     tolerance = constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD]
     iterations = 0
     change = 2.0 * tolerance
     while change > tolerance and iterations < ITERATIONS:
-        add_generalised(b, wheelset, constants, wheel, contact, force, wheelset_force, rail_force)
+        B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, left)
+        B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, right)
+        increment = B_l @ f_l + B_r @ f_r - before
         a = ti.Vector.zero(ti.f64, 5)
         for m in ti.static(range(5)):
             for k in ti.static(range(5)):
-                increment = wheelset_force[b, wheelset, k] - wheelset_before[b, wheelset, k]
-                a[m] += wheelset_compliance[wheelset, m, k] * increment
+                a[m] += wheelset_compliance[wheelset, m, k] * increment[k]
         x = x_free + constants[at.BETA_DT2] * a
         dx = dx_free + constants[at.GAMMA_DT] * a
-        left = evaluate(b, wheelset, 0, V, irregularity, constants, wheel, dims, table, x, dx, rail_compliance, rail_free,
-                        rail_force, rail_before, contact)  # fmt: skip
-        right = evaluate(b, wheelset, 1, V, irregularity, constants, wheel, dims, table, x, dx, rail_compliance, rail_free,
-                         rail_force, rail_before, contact)  # fmt: skip
-        f_l, D_l = wr.contact_law(left, constants[at.FRICTION])
-        f_r, D_r = wr.contact_law(right, constants[at.FRICTION])
-        B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, left)
-        B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, right)
-        ll = D_l @ response(0, 0, wheelset, V, constants, B_l, R_l, B_l, R_l, left[wr.COS], wheelset_compliance, rail_compliance)  # fmt: skip
-        lr = D_l @ response(0, 1, wheelset, V, constants, B_l, R_l, B_r, R_r, left[wr.COS], wheelset_compliance, rail_compliance)  # fmt: skip
-        rl = D_r @ response(1, 0, wheelset, V, constants, B_r, R_r, B_l, R_l, right[wr.COS], wheelset_compliance, rail_compliance)  # fmt: skip
-        rr = D_r @ response(1, 1, wheelset, V, constants, B_r, R_r, B_r, R_r, right[wr.COS], wheelset_compliance, rail_compliance)  # fmt: skip
+        rail_l = rail_at_end(wheelset, free_l, R_l @ f_l - before_l, constants, rail_compliance)
+        rail_r = rail_at_end(wheelset, free_r, R_r @ f_r - before_r, constants, rail_compliance)
+        left = state_of(0, V, r0, b0, x, dx, rail_l, irregularity, rolls, table, constants)
+        right = state_of(1, V, r0, b0, x, dx, rail_r, irregularity, rolls, table, constants)
+        law_l, D_l = wr.contact_law(left, constants[at.FRICTION])
+        law_r, D_r = wr.contact_law(right, constants[at.FRICTION])
         J = ti.Matrix.identity(ti.f64, 8)
         residual = ti.Vector.zero(ti.f64, 8)
+        ll = D_l @ response(1, wheelset, V, constants, B_l, R_l, B_l, left[wr.COS], wheelset_compliance, rail_compliance)
+        lr = D_l @ response(0, wheelset, V, constants, B_l, R_l, B_r, left[wr.COS], wheelset_compliance, rail_compliance)
+        rl = D_r @ response(0, wheelset, V, constants, B_r, R_r, B_l, right[wr.COS], wheelset_compliance, rail_compliance)
+        rr = D_r @ response(1, wheelset, V, constants, B_r, R_r, B_r, right[wr.COS], wheelset_compliance, rail_compliance)
         for m in ti.static(range(4)):
-            residual[m] = f_l[m] - force[b, wheelset, 0, m]
-            residual[4 + m] = f_r[m] - force[b, wheelset, 1, m]
+            residual[m] = law_l[m] - f_l[m]
+            residual[4 + m] = law_r[m] - f_r[m]
             for n in ti.static(range(4)):
                 J[m, n] -= ll[m, n]
                 J[m, 4 + n] -= lr[m, n]
@@ -215,33 +234,39 @@ def solve_wheelset(
         step = solve8(J, residual)
         change = 0.0
         for m in ti.static(range(4)):
-            force[b, wheelset, 0, m] = force[b, wheelset, 0, m] + step[m]
-            force[b, wheelset, 1, m] = force[b, wheelset, 1, m] + step[4 + m]
+            f_l[m] += step[m]
+            f_r[m] += step[4 + m]
             if ti.static(m < 3):
                 change = ti.max(change, ti.max(ti.abs(step[m]), ti.abs(step[4 + m])))
         iterations += 1
-    add_generalised(b, wheelset, constants, wheel, contact, force, wheelset_force, rail_force)
+    B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, left)
+    B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, right)
+    q = B_l @ f_l + B_r @ f_r
+    for m in ti.static(range(5)):
+        wheelset_force[b, wheelset, m] = q[m]
+    store(b, wheelset, 0, left, f_l, R_l @ f_l, contact, force, rail_force)
+    store(b, wheelset, 1, right, f_r, R_r @ f_r, contact, force, rail_force)
     return iterations
 
 
 @ti.func
-def wheel_output(b: int, wheelset: int, contact: Array, force: Array, rail_force: Array, wheel_out: Array):
-    """Everything a wheel reports, see ``layout``."""
+def record_wheels(b: int, wheelset: int, row: int, contact: Array, force: Array, rail_force: Array, wheel_out: Array):
+    """Everything the wheels of a wheelset report, see ``layout``."""
     for side in range(2):
         for m in ti.static(range(3)):
-            wheel_out[b, wheelset, side, at.LONGITUDINAL_CREEPAGE + m] = contact[b, wheelset, side, wr.XI_X + m]
-            wheel_out[b, wheelset, side, at.LONGITUDINAL_CREEP_FORCE + m] = force[b, wheelset, side, 1 + m]
-        wheel_out[b, wheelset, side, at.NORMAL_FORCE] = force[b, wheelset, side, 0]
-        wheel_out[b, wheelset, side, at.VERTICAL_FORCE] = rail_force[b, wheelset, side, 0]
-        wheel_out[b, wheelset, side, at.LATERAL_FORCE] = rail_force[b, wheelset, side, 1]
-        wheel_out[b, wheelset, side, at.PENETRATION] = contact[b, wheelset, side, wr.DELTA]
-        wheel_out[b, wheelset, side, at.POSITION_WHEEL] = contact[b, wheelset, side, wr.S_W]
-        wheel_out[b, wheelset, side, at.POSITION_RAIL] = contact[b, wheelset, side, wr.S_R]
-        wheel_out[b, wheelset, side, at.ROLLING_RADIUS] = contact[b, wheelset, side, wr.R_C]
-        wheel_out[b, wheelset, side, at.RAIL_DEFLECTION] = contact[b, wheelset, side, wr.RAIL_W]
-        wheel_out[b, wheelset, side, at.IRREGULARITY_VERTICAL] = contact[b, wheelset, side, wr.Z_IRR]
-        wheel_out[b, wheelset, side, at.IRREGULARITY_LATERAL] = contact[b, wheelset, side, wr.Y_IRR]
-        wheel_out[b, wheelset, side, at.RELATIVE_SHIFT] = contact[b, wheelset, side, wr.SHIFT]
+            wheel_out[b, row, wheelset, side, at.LONGITUDINAL_CREEPAGE + m] = contact[b, wheelset, side, wr.XI_X + m]
+            wheel_out[b, row, wheelset, side, at.LONGITUDINAL_CREEP_FORCE + m] = force[b, wheelset, side, 1 + m]
+        wheel_out[b, row, wheelset, side, at.NORMAL_FORCE] = force[b, wheelset, side, 0]
+        wheel_out[b, row, wheelset, side, at.VERTICAL_FORCE] = rail_force[b, wheelset, side, 0]
+        wheel_out[b, row, wheelset, side, at.LATERAL_FORCE] = rail_force[b, wheelset, side, 1]
+        wheel_out[b, row, wheelset, side, at.PENETRATION] = contact[b, wheelset, side, wr.DELTA]
+        wheel_out[b, row, wheelset, side, at.POSITION_WHEEL] = contact[b, wheelset, side, wr.S_W]
+        wheel_out[b, row, wheelset, side, at.POSITION_RAIL] = contact[b, wheelset, side, wr.S_R]
+        wheel_out[b, row, wheelset, side, at.ROLLING_RADIUS] = contact[b, wheelset, side, wr.R_C]
+        wheel_out[b, row, wheelset, side, at.RAIL_DEFLECTION] = contact[b, wheelset, side, wr.RAIL_W]
+        wheel_out[b, row, wheelset, side, at.IRREGULARITY_VERTICAL] = contact[b, wheelset, side, wr.Z_IRR]
+        wheel_out[b, row, wheelset, side, at.IRREGULARITY_LATERAL] = contact[b, wheelset, side, wr.Y_IRR]
+        wheel_out[b, row, wheelset, side, at.RELATIVE_SHIFT] = contact[b, wheelset, side, wr.SHIFT]
 
 
 @ti.kernel
@@ -287,28 +312,18 @@ def wheel_forces(
             for m in ti.static(range(5)):
                 x[m] = wheelset_u[b, w, m]
                 dx[m] = wheelset_v[b, w, m]
-            for side in range(2):
-                r = ti.Vector.zero(ti.f64, 9)
-                for m in ti.static(range(9)):
-                    r[m] = rail_motion[b, w, side, m]
-                state = wr.contact_state(
-                    2.0 * side - 1.0,
-                    V,
-                    wheel[w, 0],
-                    wheel[w, 1],
-                    x,
-                    dx,
-                    ti.Vector([r[0], r[1], r[2]]),
-                    ti.Vector([r[3], r[4], r[5]]),
-                    ti.Vector([r[6], r[7], r[8]]),
-                    felt,
-                    rolls,
-                    table,
-                    constants,
-                )
-                for m in ti.static(range(wr.N_CONTACT)):
-                    contact_out[b, w, side, m] = state[m]
-                f, _ = wr.contact_law(state, constants[at.FRICTION])
-                for m in ti.static(range(4)):
-                    force_out[b, w, side, m] = f[m]
-            add_generalised(b, w, constants, wheel, contact_out, force_out, wheelset_force_out, rail_force_out)
+            left = state_of(
+                0, V, wheel[w, 0], wheel[w, 1], x, dx, stored_rail(b, w, 0, rail_motion), felt, rolls, table, constants
+            )
+            right = state_of(
+                1, V, wheel[w, 0], wheel[w, 1], x, dx, stored_rail(b, w, 1, rail_motion), felt, rolls, table, constants
+            )
+            f_l, _ = wr.contact_law(left, constants[at.FRICTION])
+            f_r, _ = wr.contact_law(right, constants[at.FRICTION])
+            B_l, R_l = wr.force_directions(-1.0, wheel[w, 0], wheel[w, 1], constants[at.ARM_HEAD], left)
+            B_r, R_r = wr.force_directions(1.0, wheel[w, 0], wheel[w, 1], constants[at.ARM_HEAD], right)
+            q = B_l @ f_l + B_r @ f_r
+            for m in ti.static(range(5)):
+                wheelset_force_out[b, w, m] = q[m]
+            store(b, w, 0, left, f_l, R_l @ f_l, contact_out, force_out, rail_force_out)
+            store(b, w, 1, right, f_r, R_r @ f_r, contact_out, force_out, rail_force_out)

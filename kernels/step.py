@@ -145,13 +145,14 @@ def keep_forces(b: int, dims: Array, force: Array, rail: Array, force_before: Ar
 
 
 @ti.func
-def record(b: int, tick: Array, dims: Array, wheel: Array, motion: Array, wheel_record: Array, body_record: Array):
+def record(
+    b: int, tick: Array, dims: Array, contact: Array, force: Array, rail_force: Array, motion: Array, wheel_record: Array,
+    body_record: Array,
+):  # fmt: skip
     """Copy the wheels' output and the bodies' motion into the rows of the buffers that this step is to fill."""
     if tick[at.WHEEL_RECORD] >= 0:
         for w in range(dims[at.WHEELSETS]):
-            for side in range(2):
-                for m in range(at.N_WHEEL):
-                    wheel_record[b, tick[at.WHEEL_RECORD], w, side, m] = wheel[b, w, side, m]
+            ct.record_wheels(b, w, tick[at.WHEEL_RECORD], contact, force, rail_force, wheel_record)
     if tick[at.BODY_RECORD] >= 0:
         base = dims[at.VEHICLES] + b * dims[at.VEHICLE_DOFS]
         for i in range(5 * dims[at.BODIES]):
@@ -201,9 +202,6 @@ def explicit_forces(
     element_table: Reals3,
     # state
     motion: Reals2,
-    u: Reals1,
-    v: Reals1,
-    f_out: Reals1,
     modal: Reals3,
     seat_motion: Reals3,
     seat_force_out: Reals3,
@@ -211,8 +209,7 @@ def explicit_forces(
 ):
     """First half of a pass; see the module. Array shapes as in ``tiengine.model`` and the stages' own kernels.
 
-    ``u``, ``v``, ``f_out`` are the rows U, V, F of ``motion``; ``pressure_out`` is written only where the mortar is
-    evaluated (mortar mode 1 or 2).
+    ``pressure_out`` is written only where the mortar is evaluated (mortar mode 1 or 2).
     """
     ti.loop_config(serialize=not parallel)
     for z in range(dims[at.TRAINS] * ti.static(512 if parallel else 1)):
@@ -246,7 +243,7 @@ def explicit_forces(
                     pressure_out[b, slot, 1] = pressure[1]
             base = dims[at.VEHICLES] + b * dims[at.VEHICLE_DOFS]
             suspension.add_suspension_forces(
-                u, v, f_out, base, element_index, element_row, element_kind, element_linear, element_table
+                base, element_index, element_row, element_kind, element_linear, element_table, motion, at.U, at.V, at.F
             )
             add_vehicle_forces(b, V_rate, dims, vehicle_load, wheelset_dof, wheel, motion)
 
@@ -278,7 +275,6 @@ def contact_and_update(
     rail_force: Reals4,
     wheelset_before: Reals3,
     rail_before: Reals4,
-    wheel_out: Reals4,
     iterations_out: Ints2,
     wheel_record: Reals5,
     body_record: Reals4,
@@ -312,6 +308,4 @@ def contact_and_update(
             )
             update(b, dims, constants, motion)
             if tick[at.LAST_PASS] == 1:
-                for w in range(dims[at.WHEELSETS]):
-                    ct.wheel_output(b, w, contact, force, rail_force, wheel_out)
-                record(b, tick, dims, wheel_out, motion, wheel_record, body_record)
+                record(b, tick, dims, contact, force, rail_force, motion, wheel_record, body_record)

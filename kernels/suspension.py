@@ -30,37 +30,40 @@ def table_force(e: int, q: float, table: Array):
 
 @ti.func
 def add_suspension_forces(
-    u: Array,
-    v: Array,
-    f: Array,
     base: int,
     index: Array,
     row: Array,
     kind: Array,
     linear: Array,
     table: Array,
+    motion: Array,
+    row_u: int,
+    row_v: int,
+    row_f: int,
 ):
     """Add the deviations of one train's elements to ``f``.
 
     Args:
-        u: Displacements [m, rad], flat; the train's coordinates start at ``base``.
-        v: Velocities [m/s, rad/s], likewise.
-        f: Generalised forces [N, N m], likewise, added to.
-        base: First coordinate of the train.
+        base: Column of the train's first coordinate.
         index: Coordinates of each element, shape (n_e, 12).
         row: Elongation per coordinate, shape (n_e, 12).
         kind: 0 force of the rate, 1 force of the elongation, shape (n_e,).
         linear: Slope that stands in C or K [N s/m, N/m], shape (n_e,).
         table: Points (abscissa, force), shape (n_e, points, 2).
+        motion: State, one column a coordinate.
+        row_u: Row of the displacements [m, rad].
+        row_v: Row of the velocities [m/s, rad/s].
+        row_f: Row of the generalised forces [N, N m], added to.
     """
     for e in range(kind.shape[0]):
         q = 0.0
         for k in range(row.shape[1]):
             i = base + index[e, k]
-            q += row[e, k] * (v[i] if kind[e] == 0 else u[i])
+            q += row[e, k] * (motion[row_v, i] if kind[e] == 0 else motion[row_u, i])
         deviation = table_force(e, q, table) - linear[e] * q
         for k in range(row.shape[1]):
-            f[base + index[e, k]] -= row[e, k] * deviation
+            i = base + index[e, k]
+            motion[row_f, i] = motion[row_f, i] - row[e, k] * deviation
 
 
 @ti.kernel
@@ -72,12 +75,12 @@ def suspension_forces(
     kind: Ints1,
     linear: Reals1,
     table: Reals3,
-    # State in:
-    u_in: Reals1,
-    v_in: Reals1,
-    # State out:
-    f_out: Reals1,
+    # State:
+    motion_out: Reals2,
 ):
-    """Add the deviations of every train's elements; train b has the coordinates b n to (b + 1) n."""
-    for b in range(u_in.shape[0] // n):
-        add_suspension_forces(u_in, v_in, f_out, b * n, index, row, kind, linear, table)
+    """Add the deviations of every train's elements; rows of the motion are displacement, velocity, force.
+
+    Train b has the columns b n to (b + 1) n.
+    """
+    for b in range(motion_out.shape[1] // n):
+        add_suspension_forces(b * n, index, row, kind, linear, table, motion_out, 0, 1, 2)

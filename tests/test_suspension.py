@@ -16,7 +16,7 @@ NAMES = ("CRH380A_v2", "CRH380A_v6", "Zhai_coach", "Manchester")
 
 def kernel_forces(train: TrainModel, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
     """What the kernel adds for states of shape (trains, n)."""
-    f = np.zeros(u.size)
+    motion = np.stack([u.ravel(), v.ravel(), np.zeros(u.size)])
     suspension_forces(
         train.n,
         train.element_index,
@@ -24,11 +24,9 @@ def kernel_forces(train: TrainModel, u: NDArray[np.float64], v: NDArray[np.float
         train.element_kind,
         train.element_linear,
         train.element_table,
-        np.ascontiguousarray(u).ravel(),
-        np.ascontiguousarray(v).ravel(),
-        f,
+        motion,
     )
-    return f.reshape(u.shape)
+    return motion[2].reshape(u.shape)
 
 
 def law(points: NDArray[np.float64], q: float) -> float:
@@ -93,8 +91,9 @@ def test_hand_values(name, part, q, force):
     u, v = (state, 0.0 * state) if train.element_kind[e] else (0.0 * state, state)
     alone = {key: getattr(train, key)[e : e + 1] for key in
              ("element_index", "element_row", "element_kind", "element_linear", "element_table")}  # fmt: skip
-    f = np.zeros(train.n)
-    suspension_forces(train.n, *alone.values(), u.ravel(), v.ravel(), f)
+    motion = np.stack([u.ravel(), v.ravel(), np.zeros(train.n)])
+    suspension_forces(train.n, *alone.values(), motion)
+    f = motion[2]
     whole = train.element_linear[e] * q - f[y] / train.element_row[e, 0]
     assert whole == pytest.approx(force, rel=1e-12, abs=1e-9)  # rounding of the difference
 

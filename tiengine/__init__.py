@@ -1,0 +1,37 @@
+"""tiengine: trains on slab track, in three dimensions, by a window of rail that moves with them.
+
+``run(scenario)`` simulates, ``open(path)`` reads a result file. Both are loaded when first used, so that importing the
+package costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tiengine.quantity import InputError as InputError
+    from tiengine.results import Result as Result
+    from tiengine.results import open as open
+    from tiengine.scenario import load_scenario as load_scenario
+    from tiengine.simulate import run as run
+
+__version__ = metadata.version("tiengine")
+__all__ = ["InputError", "Result", "load_scenario", "open", "run"]
+
+_HOMES = {
+    "InputError": "tiengine.quantity",
+    "Result": "tiengine.results",
+    "load_scenario": "tiengine.scenario",
+    "open": "tiengine.results",
+    "run": "tiengine.simulate",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for."""
+    from importlib import import_module
+
+    if name not in _HOMES:
+        raise AttributeError(f"module 'tiengine' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)

@@ -31,7 +31,7 @@ SUMMARY = {
     "dofs": ("degrees of freedom", "{:d}"),
     "time_step": ("time step", "{:.3g} s"),
     "simulated_time": ("simulated time", "{:.3f} s"),
-    "real_time_factor": ("real-time factor (above 1: faster than real time)", "{:.2f}"),
+    "real_time_factor": ("real-time factor (wall over simulated time)", "{:.2f}"),
     "wall_time_import": ("wall time, import", "{:.2f} s"),
     "wall_time_jit": ("wall time, JIT", "{:.2f} s"),
     "wall_time_setup": ("wall time, set-up", "{:.2f} s"),
@@ -175,7 +175,7 @@ def _progress(console: Console, name: str) -> Iterator[Callable[[float, float], 
                 clock.extend((time.perf_counter(), simulated_time))
                 bar.start_task(task)
             elapsed = time.perf_counter() - clock[0]
-            factor = (simulated_time - clock[1]) / elapsed if elapsed > 0.0 else 0.0
+            factor = elapsed / max(simulated_time - clock[1], 1e-9)
             bar.update(task, completed=simulated_time, total=end_time, factor=factor)
 
         yield update

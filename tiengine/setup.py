@@ -11,7 +11,6 @@ from tiengine.contact_geometry import ContactSettings, ContactTable, build_conta
 from tiengine.defects import fastening_factors
 from tiengine.integrator import Newmark
 from tiengine.model import Ingredients, SlabDesigns
-from tiengine.mortar import MortarVoid
 from tiengine.quantity import InputError
 from tiengine.scenario import Scenario
 from tiengine.slab import slab_designs
@@ -31,7 +30,7 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         InputError: Parts that do not go together.
     """
     parts, numerics = scenario.parts, scenario.numerics
-    train = assemble(parts.vehicles, parts.centres, series_springs=scenario.train.series_springs)
+    train = assemble(parts.vehicles, parts.centres, series_springs=scenario.train.series_springs or None)
     return Ingredients(
         rail=parts.rail,
         fastening=parts.fastening,
@@ -84,12 +83,7 @@ def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64
 def _designs(scenario: Scenario) -> SlabDesigns:
     """One design for each slab that has a void or a failed fastening, besides the sound one."""
     parts, track = scenario.parts, scenario.track
-    voids = [
-        MortarVoid(
-            slab=void.slab, x_from=void.x[0], x_to=void.x[1], y_from=void.y[0], y_to=void.y[1], factor=void.factor
-        )
-        for void in track.mortar_voids
-    ]
+    voids = scenario.mortar_voids
     matrices, of_void = slab_designs(parts.slab, parts.mortar, voids)
     per_slab = parts.slab.fastenings
     damaged = set(of_void)

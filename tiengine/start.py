@@ -21,7 +21,7 @@ from tiengine.quantity import InputError
 from tiengine.state import State, positions
 from tiengine.track_static import StaticTrack
 
-__all__ = ["ContactForces", "equilibrium", "evaluate_contact"]
+__all__ = ["ContactForces", "equilibrium", "evaluate_contact", "release"]
 
 NEWTON = 60
 FORCE_TOLERANCE = 1e-4  # N: a billionth of a wheel load
@@ -116,6 +116,21 @@ def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 
     forces = problem.contact(y[None])
     state.force[:], state.contact[:] = forces.local, forces.contact
     state.wheelset_force[:], state.rail_force[:] = forces.wheelset, forces.rail
+
+
+def release(model: Model, state: State, X: float) -> None:
+    """Put all trains onto the track without load, as the paper does: all zero but the weight's acceleration.
+
+    Args:
+        model: Constant data.
+        state: Written.
+        X: Chainage of the window's rear end [m].
+    """
+    clock = positions(model, np.array([X]), np.zeros(1), np.zeros(1)).clock[0]
+    state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
+    n = model.given.train.n_dof
+    mass = np.diag(model.given.train.M)
+    state.view(at.A, "vehicles")[:, :n] = model.given.train.gravity[:n] / mass[:n]
 
 
 class _Problem:

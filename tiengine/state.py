@@ -30,7 +30,6 @@ class State:
         modal, seat_motion, seat_force: Fastening scratch and forces.
         pressure: Largest and smallest mortar pressure of each slab [Pa], shape (B, slots, 2).
         rail_free, contact, force, wheelset_force, rail_force, wheelset_before, rail_before: Contact scratch; ``force`` starts the next solve.
-        wheel: Output of the wheels, shape (B, W, 2, N_WHEEL).
         iterations: Most Newton iterations of each wheelset since last reset, shape (B, W).
         first_seat, first_slab: Rear seat and slab of the window.
     """
@@ -49,7 +48,6 @@ class State:
     rail_force: NDArray[np.float64]
     wheelset_before: NDArray[np.float64]
     rail_before: NDArray[np.float64]
-    wheel: NDArray[np.float64]
     iterations: NDArray[np.int32]
     first_seat: int = -1
     first_slab: int = -1
@@ -83,7 +81,6 @@ class State:
             rail_force=np.zeros((B, W, 2, 3)),
             wheelset_before=np.zeros((B, W, 5)),
             rail_before=np.zeros((B, W, 2, 3)),
-            wheel=np.zeros((B, W, 2, at.N_WHEEL)),
             iterations=np.zeros((B, W), dtype=np.int32),
             _blocks=blocks,
         )

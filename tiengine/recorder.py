@@ -1,0 +1,103 @@
+"""From the buffers that the kernels fill to the channels of the result file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.kernels import layout as at
+from tiengine.model import Model
+from tiengine.scenario import Scenario
+from tiengine.stepper import Chunk
+from tiengine.writer import GroupSpec, TrainLabels, Writer
+
+__all__ = ["Recorder"]
+
+WHEEL_COLUMNS = {
+    "normal_force": at.NORMAL_FORCE,
+    "vertical_force": at.VERTICAL_FORCE,
+    "lateral_force": at.LATERAL_FORCE,
+    "longitudinal_creepage": at.LONGITUDINAL_CREEPAGE,
+    "lateral_creepage": at.LATERAL_CREEPAGE,
+    "spin_creepage": at.SPIN_CREEPAGE,
+    "penetration": at.PENETRATION,
+    "contact_position_wheel": at.POSITION_WHEEL,
+    "contact_position_rail": at.POSITION_RAIL,
+    "rolling_radius": at.ROLLING_RADIUS,
+    "rail_deflection": at.RAIL_DEFLECTION,
+    "longitudinal_creep_force": at.LONGITUDINAL_CREEP_FORCE,
+    "lateral_creep_force": at.LATERAL_CREEP_FORCE,
+    "spin_moment": at.SPIN_MOMENT,
+}
+IRREGULARITY_COLUMNS = {"vertical": at.IRREGULARITY_VERTICAL, "lateral": at.IRREGULARITY_LATERAL}
+BODY_ROWS = {"displacement": 0, "velocity": 1, "acceleration": 2}
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """Decides which steps are recorded, and writes them.
+
+    Attributes:
+        scenario: Gives channels and intervals.
+        dt: Time step [s].
+    """
+
+    scenario: Scenario
+    dt: float
+
+    @property
+    def wheel_every(self) -> int:
+        """Steps between two samples of the wheels."""
+        return self._steps(self.scenario.output.wheel_interval)
+
+    @property
+    def body_every(self) -> int:
+        """Steps between two samples of the bodies."""
+        return self._steps(self.scenario.output.body_interval)
+
+    def groups(self) -> dict[str, GroupSpec]:
+        """What each train records."""
+        out = self.scenario.output
+        return {
+            "wheel": GroupSpec.standard("wheel", out.wheel_channels),
+            "body": GroupSpec.standard("body", out.body_channels),
+            "irregularity": GroupSpec.standard("irregularity", out.irregularity_channels, times_of="wheel"),
+        }
+
+    def labels(self, model: Model) -> TrainLabels:
+        """Labels of a train."""
+        train = model.given.train
+        return TrainLabels(
+            vehicles=[vehicle.name for vehicle in self.scenario.parts.vehicles],
+            bodies=train.body_names,
+            wheelset_vehicle=train.wheelset_vehicle,
+            wheelset_offset=train.wheelset_x,
+        )
+
+    def write(self, writer: Writer, chunk: Chunk, first: int, position: NDArray[np.float64]) -> None:
+        """Append a chunk of steps to every train of the file.
+
+        Args:
+            writer: The open file.
+            chunk: Filled buffers.
+            first: Number of the chunk's first step, counted from 1 (the state after one step).
+            position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
+        """
+        out = self.scenario.output
+        steps = np.arange(first, first + len(position))
+        at_wheels, at_bodies = steps % self.wheel_every == 0, steps % self.body_every == 0
+        time = steps * self.dt
+        wheels, bodies = int(at_wheels.sum()), int(at_bodies.sum())
+        for train in range(len(chunk.wheel)):
+            wheel, body = chunk.wheel[train, :wheels], chunk.body[train, :bodies]
+            samples = {name: wheel[..., WHEEL_COLUMNS[name]] for name in out.wheel_channels}
+            writer.append(train, "wheel", time[at_wheels], position[at_wheels], samples)
+            felt = {name: wheel[..., IRREGULARITY_COLUMNS[name]] for name in out.irregularity_channels}
+            writer.append(train, "irregularity", time[at_wheels], position[at_wheels], felt)
+            motion = {name: body[:, BODY_ROWS[name]].reshape(bodies, -1, 5) for name in out.body_channels}
+            writer.append(train, "body", time[at_bodies], position[at_bodies], motion)
+
+    def _steps(self, interval: float | str) -> int:
+        return 1 if isinstance(interval, str) else max(1, round(interval / self.dt))
