@@ -183,7 +183,7 @@ def scatter(b: int, n: int, seats: int, lateral: int, s0: float, length: float, 
 @ti.func
 def add_smeared(b: int, n: int, lateral: int, constants: Array, motion: Array):
     """Add (beta dt^2 K_s + gamma dt C_s) a of the smeared fastenings that stand in the rails' implicit blocks."""
-    per_mode = constants[at.LENGTH] / (2.0 * constants[at.SPACING])
+    per_mode = constants[at.SMEARING] * constants[at.LENGTH] / (2.0 * constants[at.SPACING])
     kv = per_mode * (constants[at.BETA_DT2] * constants[at.K_VERTICAL] + constants[at.GAMMA_DT] * constants[at.C_VERTICAL])
     kl = per_mode * (constants[at.BETA_DT2] * constants[at.K_LATERAL] + constants[at.GAMMA_DT] * constants[at.C_LATERAL])
     a, half = constants[at.ARM_FASTENING], constants[at.HALF_BASE]

@@ -59,8 +59,9 @@ MOTION_ROWS = 8
     TABLE_DU,
     TABLE_ALPHA0,
     TABLE_DALPHA,
+    SMEARING,  # factor on the smeared fastenings of the implicit rail blocks
     N_CONSTANTS,
-) = range(24)
+) = range(25)
 
 # Columns of ``clock[step, :]`` (float64): the window at t_{n+1}.
 (POSITION, SPEED, SPEED_RATE, FIRST_SEAT_S, FIRST_SEAT, FIRST_SLAB, N_CLOCK) = range(7)

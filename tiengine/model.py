@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tiengine.blocks import Blocks
 from tiengine.contact_geometry import ContactTable
 from tiengine.fastening import Fastening, seat_count, seat_tables
-from tiengine.integrator import Newmark, inverse, seat_inverse_terms, slab_operator
+from tiengine.integrator import Newmark, inverse, seat_inverse_terms, slab_operator, smearing
 from tiengine.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
 from tiengine.mortar import Mortar
@@ -184,7 +184,7 @@ def build_model(given: Ingredients, V: float) -> Model:
         wheel_s=wheel_s,
         centre_s=float(centre_s),
         dims=_dims(given, first),
-        constants=_constants(given),
+        constants=_constants(given, window),
         stiffness=window.modal_stiffness,
         mass=window.modal_masses,
         G=sine_products(given.modes),
@@ -222,7 +222,7 @@ def _dims(given: Ingredients, first: SlabMatrices) -> NDArray[np.int32]:
     return dims
 
 
-def _constants(given: Ingredients) -> NDArray[np.float64]:
+def _constants(given: Ingredients, window: RailWindow) -> NDArray[np.float64]:
     """Numbers, see ``layout``."""
     c = np.zeros(at.N_CONSTANTS)
     newmark, fastening, rail, table = given.newmark, given.fastening, given.rail, given.contact
@@ -236,6 +236,7 @@ def _constants(given: Ingredients) -> NDArray[np.float64]:
     c[at.FRICTION], c[at.CROWN_OFFSET] = given.friction, table.crown_offset
     c[at.IRREGULARITY_HALF_BASE], c[at.CONTACT_TOLERANCE] = HALF_BASE, CONTACT_TOLERANCE
     c[at.STATIC_LOAD] = float(np.max(static_wheel_loads(given.train)))
+    c[at.SMEARING] = smearing(window, given.slab.fastening_pitch)
     c[at.TABLE_U0], c[at.TABLE_DU] = table.u_min, table.du
     c[at.TABLE_ALPHA0], c[at.TABLE_DALPHA] = table.alpha_min, table.dalpha
     return c

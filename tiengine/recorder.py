@@ -96,7 +96,8 @@ class Recorder:
             writer.append(train, "wheel", time[at_wheels], position[at_wheels], samples)
             felt = {name: wheel[..., IRREGULARITY_COLUMNS[name]] for name in out.irregularity_channels}
             writer.append(train, "irregularity", time[at_wheels], position[at_wheels], felt)
-            motion = {name: body[:, BODY_ROWS[name]].reshape(bodies, -1, 5) for name in out.body_channels}
+            shape = (bodies, body.shape[-1] // 5, 5)  # a short last chunk may hold no sample of the bodies
+            motion = {name: body[:, BODY_ROWS[name]].reshape(shape) for name in out.body_channels}
             writer.append(train, "body", time[at_bodies], position[at_bodies], motion)
 
     def _steps(self, interval: float | str) -> int:

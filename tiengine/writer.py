@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import os
 import platform
+import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
@@ -241,7 +242,8 @@ class Writer:
 
     def _create(self, force: bool) -> Any:
         if self._path is None or self._temporary is None:
-            return h5py.File("tiengine", "w", driver="core", backing_store=False)
+            name = f"tiengine-{uuid.uuid4()}"  # HDF5 refuses two open files of one name, in memory too
+            return h5py.File(name, "w", driver="core", backing_store=False)
         check_output(self._path, force)
         try:
             return h5py.File(self._temporary, "w")

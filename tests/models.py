@@ -1,0 +1,64 @@
+"""Models of built-in scenarios for the tests, built once a session: the contact table takes seconds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.integrator import Newmark
+from tiengine.kernels import layout as at
+from tiengine.model import Ingredients, Model, build_model
+from tiengine.scenario import load_scenario
+from tiengine.setup import ingredients
+from tiengine.start import equilibrium
+from tiengine.state import State
+from tiengine.stepper import Chunk, Stepper
+
+V350 = 350.0 / 3.6
+"""m/s: the paper's speed."""
+
+
+@cache
+def _base(overrides: tuple[str, ...]) -> Ingredients:
+    return ingredients(load_scenario("paper", overrides), 1e-4)
+
+
+def paper_model(*overrides: str, V: float = V350, dt: float = 1e-4, **changes: Any) -> Model:
+    """Model of the scenario ``paper``.
+
+    Args:
+        overrides: Keys of the scenario, ``"numerics.passes=3"``.
+        V: Speed [m/s].
+        dt: Time step [s].
+        changes: Fields of ``Ingredients`` that replace the scenario's.
+    """
+    return build_model(replace(_base(overrides), newmark=Newmark(dt), **changes), V)
+
+
+class Run:
+    """A state marched at constant speed, one step a call."""
+
+    def __init__(self, model: Model, V: float, X: float = 0.0, steps: int = 1000, start: bool = True) -> None:
+        """Put the train into steady rolling at chainage X of the window's rear end [m]."""
+        self.model, self.V, self.X = model, V, X
+        self.state = State.at_rest(model)
+        if start:
+            equilibrium(model, self.state, X, V)
+        self.chunk = Chunk.empty(model, steps, steps, steps)
+        self.stepper = Stepper(model, self.state, self.chunk)
+
+    def march(self, steps: int, irregularity: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Advance; returns the wheels' output, shape (steps, W, 2, N_WHEEL)."""
+        X = self.X + self.V * self.model.given.newmark.dt * np.arange(1, steps + 1)
+        trains, wheelsets = self.state.iterations.shape
+        if irregularity is None:
+            irregularity = np.zeros((trains, steps, wheelsets, at.N_IRREGULARITY))
+        self.stepper.load(X, np.full(steps, self.V), np.zeros(steps), irregularity)
+        for i in range(steps):
+            self.stepper.step(i, i, i)
+        self.X = float(X[-1])
+        return self.chunk.wheel[0, :steps].copy()

@@ -1,0 +1,182 @@
+"""The engine's semi-discrete equations as one first-order system, for general-purpose ODE solvers.
+
+Written with matrices, apart from the step and its kernels: linear parts from the host's M, C, K; fastenings as springs
+and dampers between a rail's shape at the moving seat and a slab's shape; only the wheel-rail contact and the nonlinear
+suspension elements are evaluated by the engine's kernels. y = (u, du/dt), u = (rails, slabs, vehicle), where a rail's
+coordinates are w, theta_y, v, theta_z, theta_x, N modes each.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as la
+from numpy.typing import NDArray
+
+from tiengine.irregularity import Irregularity
+from tiengine.kernels import layout as at
+from tiengine.kernels.suspension import suspension_forces
+from tiengine.model import Model
+from tiengine.start import ContactForces, evaluate_contact
+from tiengine.state import State
+
+NUDGE = np.concatenate([np.full(5, 1e-9), np.full(5, 1e-7), np.full(18, 1e-9)])
+"""Steps for the contact's derivatives: wheelset u and du/dt, then w, v, theta_x, slopes, rates of either rail."""
+
+
+class SemiDiscrete:
+    """M u'' + C u' + K u + fastenings(t, u, u') = gravity + suspension + contact(t, u, u'), one train, constant speed."""
+
+    def __init__(self, model: Model, track: Irregularity, V: float, slabs: range) -> None:
+        """Assemble.
+
+        Args:
+            model: Gives the matrices.
+            track: Irregularity.
+            V: Speed [m/s].
+            slabs: All slabs that the window touches, from its beginning to its end.
+        """
+        self.model, self.track, self.V, self.slabs = model, track, V, slabs
+        g = model.given
+        sound, train = g.designs.matrices[0], g.train
+        rail = [la.block_diag(*(m.toarray() for m in pair)) for pair in zip(model.window.vertical(V), model.window.lateral(V), strict=True)]
+        slab = [sound.M, sound.C_bed, sound.K_plate + sound.K_bed]
+        vehicle = [train.M, train.C + V * train.C_speed, train.K]
+        self.M, self.C, self.K = (
+            la.block_diag(r, r, *[s] * len(slabs), v) for r, s, v in zip(rail, slab, vehicle, strict=True)
+        )
+        self.inverse = la.block_diag(*[la.inv(x) for x in (rail[0], rail[0], *[slab[0]] * len(slabs), vehicle[0])])
+        self.n, self.modes, self.slab_dofs = len(self.M), g.modes, sound.n
+        self.first_slab_dof = 10 * g.modes
+        self.first_vehicle_dof = self.n - train.n
+        self.dof = self.first_vehicle_dof + train.wheelset_dof
+        self._seats()
+
+    def _seats(self) -> None:
+        """The slabs' side of every fastening that can stand in the window, and stiffness and damping."""
+        g, sound = self.model.given, self.model.given.designs.matrices[0]
+        f, b = g.fastening, g.rail.half_base
+        self.seats = np.arange(self.slabs.start * g.slab.fastenings, self.slabs.stop * g.slab.fastenings)
+        self.on_slab = np.zeros((len(self.seats), 2, 3, self.n))
+        for i, seat in enumerate(self.seats):
+            slab, j = divmod(int(seat), g.slab.fastenings)
+            base = self.first_slab_dof + (slab - self.slabs.start) * self.slab_dofs
+            for side in range(2):
+                np.add.at(self.on_slab[i, side, 0], base + sound.seat_index[j, side], sound.seat_w[j, side])
+                np.add.at(self.on_slab[i, side, 1], base + sound.seat_index[j, side], b * sound.seat_slope[j, side])
+                self.on_slab[i, side, 2, base + self.slab_dofs - 2 : base + self.slab_dofs] = 1.0, sound.seat_x[j]
+        self.k = np.array([f.vertical_stiffness, f.vertical_stiffness, f.lateral_stiffness])
+        self.c = np.array([f.vertical_damping, f.vertical_damping, f.lateral_damping])
+
+    def fastenings(self, t: float) -> tuple[NDArray[np.float64], ...]:
+        """E and F at time t: elongations E u, their rates E u' + F u; with k and c by row."""
+        g, n = self.model.given, self.modes
+        s = (self.seats + 0.5) * g.slab.fastening_pitch - self.V * t
+        here = (s > 0.0) & (s < g.length)
+        s, E = s[here], -self.on_slab[here]
+        F = np.zeros_like(E)
+        k = np.arange(1, n + 1) * np.pi / g.length
+        phi, rate = np.sin(np.outer(s, k)), -self.V * k * np.cos(np.outer(s, k))
+        for side in range(2):
+            w, v, roll = (5 * n * side + field * n for field in (0, 2, 4))
+            for kind, base, arm in ((0, w, 1.0), (1, roll, g.rail.half_base), (2, v, 1.0), (2, roll, -g.rail.arm_fastening)):
+                E[:, side, kind, base : base + n] = arm * phi
+                F[:, side, kind, base : base + n] = arm * rate
+        rows = 2 * int(here.sum())
+        return E.reshape(-1, self.n), F.reshape(-1, self.n), np.tile(self.k, rows), np.tile(self.c, rows)
+
+    def under_wheels(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """w, v, theta_x, their slopes and rates of the rails under the wheels, shape (W, 2, 9)."""
+        value, slope = self.model.wheel_shape
+        rails = [x[: self.first_slab_dof].reshape(2, 5, self.modes)[:, [0, 2, 4]] for x in (u, v)]
+        parts = [np.einsum("wn,rfn->wrf", a, x) for a, x in ((value, rails[0]), (slope, rails[0]), (value, rails[1]))]
+        return np.concatenate(parts, axis=2)
+
+    def contact(self, t: float, y: NDArray[np.float64]) -> ContactForces:
+        """Contact of all wheels."""
+        u, v = y[: self.n], y[self.n :]
+        return self._contact(t, u[self.dof][None], v[self.dof][None], self.under_wheels(u, v)[None])
+
+    def _contact(self, t: float, *motion: NDArray[np.float64]) -> ContactForces:
+        felt = self.track.sample(self.V * t + self.model.wheel_s)
+        return evaluate_contact(self.model, self.V, felt, *motion)
+
+    def rhs(self, t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """dy/dt."""
+        u, v = y[: self.n], y[self.n :]
+        E, F, k, c = self.fastenings(t)
+        f = -self.C @ v - self.K @ u - E.T @ (k * (E @ u) + c * (E @ v + F @ u))
+        found = self.contact(t, y)
+        np.add.at(f, self.dof, found.wheelset[0])
+        f[: self.first_slab_dof] += self._on_rails(found.rail[0])
+        f[self.first_vehicle_dof :] += self._on_vehicle(u[self.first_vehicle_dof :], v[self.first_vehicle_dof :])
+        return np.concatenate([v, self.inverse @ f])
+
+    def _on_rails(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Generalised forces of wheels on the rails, from forces on w, v, theta_x, shape (W, 2, 3)."""
+        out = np.zeros((2, 5, self.modes))
+        out[:, [0, 2, 4]] = np.einsum("wn,wrf->rfn", self.model.wheel_shape[0], force)
+        return out.ravel()
+
+    def _on_vehicle(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gravity, nonlinear suspension, gyroscopic pair of the pitch rates."""
+        train = self.model.given.train
+        motion = np.stack([u, v, train.gravity])
+        suspension_forces(
+            train.n, train.element_index, train.element_row, train.element_kind, train.element_linear,
+            train.element_table, motion,
+        )  # fmt: skip
+        roll, pitch, yaw = train.wheelset_dof[:, 2:].T
+        motion[2, roll] += train.wheelset_spin_inertia * v[pitch] * v[yaw]
+        motion[2, yaw] -= train.wheelset_spin_inertia * v[pitch] * v[roll]
+        return motion[2]
+
+    def jacobian(self, t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """d rhs / dy; the nonlinear suspension's deviations left out (a solver needs it only to converge)."""
+        u, v, n = y[: self.n], y[self.n :], self.n
+        E, F, k, c = self.fastenings(t)
+        by_u = -self.K - E.T @ (k[:, None] * E + c[:, None] * F)
+        by_v = -self.C - E.T @ (c[:, None] * E)
+        for w, (J, inputs) in enumerate(zip(self._contact_derivatives(t, u, v), self._inputs(), strict=True)):
+            place = np.zeros((n, 11))
+            place[self.dof[w], np.arange(5)] = 1.0
+            for side in range(2):
+                for m, field in enumerate((0, 2, 4)):
+                    base = (5 * side + field) * self.modes
+                    place[base : base + self.modes, 5 + 3 * side + m] = self.model.wheel_shape[0, w]
+            by_u += place @ (J @ inputs[0])
+            by_v += place @ (J @ inputs[1])
+        return np.block([[np.zeros((n, n)), np.eye(n)], [self.inverse @ by_u, self.inverse @ by_v]])
+
+    def _contact_derivatives(self, t: float, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces on wheelset (5) and rails (2, 3) by the 28 inputs of :meth:`_inputs`, shape (W, 11, 28)."""
+        W = len(self.dof)
+        base = np.concatenate([u[self.dof], v[self.dof], self.under_wheels(u, v).reshape(W, 18)], axis=1)
+        nudge = np.diag(NUDGE)
+        trials = base + np.concatenate([nudge, -nudge])[:, None, :]
+        found = self._contact(t, trials[..., :5], trials[..., 5:10], trials[..., 10:].reshape(56, W, 2, 9))
+        force = np.concatenate([found.wheelset, found.rail.reshape(56, W, 6)], axis=2)
+        return np.einsum("kwm->wmk", (force[:28] - force[28:]) / (2.0 * NUDGE)[:, None, None])
+
+    def _inputs(self) -> list[NDArray[np.float64]]:
+        """What a wheelset's contact feels, as linear in u and in v; shape (2, 28, n) a wheelset."""
+        out = []
+        for w in range(len(self.dof)):
+            rows = np.zeros((2, 28, self.n))
+            rows[0, np.arange(5), self.dof[w]] = rows[1, 5 + np.arange(5), self.dof[w]] = 1.0
+            for side in range(2):
+                for m, field in enumerate((0, 2, 4)):
+                    base = slice((5 * side + field) * self.modes, (5 * side + field + 1) * self.modes)
+                    rows[0, 10 + 9 * side + m, base] = rows[1, 16 + 9 * side + m, base] = self.model.wheel_shape[0, w]
+                    rows[0, 13 + 9 * side + m, base] = self.model.wheel_shape[1, w]
+            out.append(rows)
+        return out
+
+    def pack(self, state: State) -> NDArray[np.float64]:
+        """y of an engine's state whose window begins at the first of the slabs."""
+        halves = []
+        for row in (at.U, at.V):
+            vertical, lateral = state.view(row, "vertical")[0], state.view(row, "lateral")[0]
+            slots = state.view(row, "slabs")[0]
+            slabs = [slots[slab % len(slots)] for slab in self.slabs]
+            halves += [np.hstack([vertical, lateral]).ravel(), *slabs, state.view(row, "vehicles")[0]]
+        return np.concatenate(halves)
