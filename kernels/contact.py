@@ -3,7 +3,7 @@
 At the end of a step the coordinates a wheel feels are x = x_free + S q with q the contact's generalised forces, because
 the rest of the step is linear: S = beta dt^2 A^-1 for displacements, gamma dt A^-1 for rates. Wheels stand still in
 the window, so S is constant. The wheels of one wheelset are solved together; all the others enter x_free with their
-forces of the pass before. Newton's method finds the forces f = (N, Fx, Fy, Mz) of both wheels of a wheelset with
+forces of the pass before. Newton's method finds the forces f = (N, Fx, Fy) of both wheels of a wheelset with
 
     f = law(e),  e = (delta, creepages)(x_free + S B f)
 
@@ -21,16 +21,18 @@ ITERATIONS = 25
 
 
 @ti.func
-def solve8(matrix: ti.template(), rhs: ti.template()):
+def solve6(matrix: ti.template(), rhs: ti.template()):
     """Gaussian elimination with the pivots on the diagonal: the matrix is the identity plus a dissipative part."""
-    for k in ti.static(range(8)):
-        for i in ti.static(range(k + 1, 8)):
-            factor = matrix[i, k] / matrix[k, k]
-            for j in ti.static(range(k + 1, 8)):
+    for k in range(6):
+        inverse = 1.0 / matrix[k, k]
+        for i in range(k + 1, 6):
+            factor = matrix[i, k] * inverse
+            for j in range(k + 1, 6):
                 matrix[i, j] -= factor * matrix[k, j]
             rhs[i] -= factor * rhs[k]
-    for k in ti.static(range(7, -1, -1)):
-        for j in ti.static(range(k + 1, 8)):
+    for m in range(6):
+        k = 5 - m
+        for j in range(k + 1, 6):
             rhs[k] -= matrix[k, j] * rhs[j]
         rhs[k] /= matrix[k, k]
     return rhs
@@ -69,12 +71,12 @@ def rail_coordinates(b: int, wheelset: int, rail: int, dims: Array, shape: Array
 
 
 @ti.func
-def stored_state(b: int, wheelset: int, side: ti.template(), contact: Array):
-    """Contact state of a wheel as the last evaluation left it."""
-    state = ti.Vector.zero(ti.f64, wr.N_CONTACT)
-    for m in ti.static(range(wr.N_CONTACT)):
-        state[m] = contact[b, wheelset, side, m]
-    return state
+def stored_place(b: int, wheelset: int, side: ti.template(), contact: Array):
+    """Contact geometry of a wheel as the last evaluation left it."""
+    place = ti.Vector.zero(ti.f64, 5)
+    for m in ti.static(range(5)):
+        place[m] = contact[b, wheelset, side, wr.SIN + m]
+    return place
 
 
 @ti.func
@@ -96,13 +98,17 @@ def stored_force(b: int, wheelset: int, side: ti.template(), count: ti.template(
 
 
 @ti.func
-def store(
-    b: int, wheelset: int, side: ti.template(), state: ti.template(), f: ti.template(), r: ti.template(),
-    contact_out: Array, force_out: Array, rail_force_out: Array,
-):  # fmt: skip
-    """Leave a wheel's contact state, its local forces and its forces on the rail in memory."""
+def store_state(b: int, wheelset: int, side: ti.template(), state: ti.template(), contact_out: Array):
+    """Leave a wheel's contact state in memory."""
     for m in ti.static(range(wr.N_CONTACT)):
         contact_out[b, wheelset, side, m] = state[m]
+
+
+@ti.func
+def store_force(
+    b: int, wheelset: int, side: ti.template(), f: ti.template(), r: ti.template(), force_out: Array, rail_force_out: Array
+):
+    """Leave a wheel's local forces and its forces on the rail in memory."""
     for m in ti.static(range(4)):
         force_out[b, wheelset, side, m] = f[m]
     for m in ti.static(range(3)):
@@ -148,32 +154,41 @@ def state_of(
 
 
 @ti.func
-def response(
-    same: ti.template(), wheelset: int, V: float, constants: Array, on_wheelset: ti.template(), on_rail: ti.template(),
-    other: ti.template(), cos_row: float, wheelset_compliance: Array, rail_compliance: Array,
+def feedback(
+    same: ti.template(), wheelset: int, V: float, constants: Array, D: ti.template(), B: ti.template(), R: ti.template(),
+    other: ti.template(), cos: float, wheelset_compliance: Array, rail_compliance: Array,
 ):  # fmt: skip
-    """W: change of (delta, xi_x, xi_y, xi_s) of one wheel by unit (N, Fx, Fy, Mz) of itself (``same``) or of the other.
+    """D W for (N, Fx, Fy): what the law of one wheel answers to unit forces of itself (``same``) or of the other wheel.
 
-    For the Jacobian the diagonal of the wheelset's compliance is enough: the inertia dominates it.
+    W is the change of (delta, xi_x, xi_y). N and Fy move y, z and roll; Fx moves pitch and yaw, and yaw steers:
+    -psi / cos gamma. The diagonal of the wheelset's compliance is enough, inertia dominates it.
     """
-    W = ti.Matrix.zero(ti.f64, 4, 4)
-    for m in ti.static(range(4)):
-        for n in ti.static(range(4)):
+    W = ti.Matrix.zero(ti.f64, 2, 2)  # (delta, xi_y) by (N, Fy)
+    for m in ti.static(range(2)):
+        for n in ti.static(range(2)):
             total = 0.0
-            for k in ti.static(range(5)):
-                total += on_wheelset[k, m] * wheelset_compliance[wheelset, k, k] * other[k, n]
+            for k in ti.static(range(3)):
+                total += B[k, 2 * m] * wheelset_compliance[wheelset, k, k] * other[k, 2 * n]
             if ti.static(same == 1):
-                total += on_rail[0, m] * rail_compliance[wheelset, 0, 0, 0] * on_rail[0, n]
+                total += R[0, 2 * m] * rail_compliance[wheelset, 0, 0, 0] * R[0, 2 * n]
                 for k in ti.static(range(1, 3)):
                     for l in ti.static(range(1, 3)):
-                        total += on_rail[k, m] * rail_compliance[wheelset, 0, k, l] * on_rail[l, n]
+                        total += R[k, 2 * m] * rail_compliance[wheelset, 0, k, l] * R[l, 2 * n]
             if ti.static(m == 0):
                 W[m, n] = -constants[at.BETA_DT2] * total  # a wheel pushed up penetrates less
             else:
-                W[m, n] = constants[at.GAMMA_DT] * total / V
-    for n in ti.static(range(4)):  # yaw steers: -psi / cos gamma
-        W[2, n] -= constants[at.BETA_DT2] * wheelset_compliance[wheelset, 4, 4] * other[4, n] / cos_row
-    return W
+                W[m, n] = constants[at.GAMMA_DT] / V * total
+    pitch = B[3, 1] * wheelset_compliance[wheelset, 3, 3] * other[3, 1]
+    yaw = wheelset_compliance[wheelset, 4, 4] * other[4, 1]
+    x = constants[at.GAMMA_DT] / V * (pitch + B[4, 1] * yaw)  # xi_x by Fx
+    y = -constants[at.BETA_DT2] * yaw / cos  # xi_y by Fx
+    return ti.Matrix(
+        [
+            [D[0, 0] * W[0, 0], 0.0, D[0, 0] * W[0, 1]],
+            [D[1, 0] * W[0, 0] + D[1, 2] * W[1, 0], D[1, 1] * x + D[1, 2] * y, D[1, 0] * W[0, 1] + D[1, 2] * W[1, 1]],
+            [D[2, 0] * W[0, 0] + D[2, 2] * W[1, 0], D[2, 1] * x + D[2, 2] * y, D[2, 0] * W[0, 1] + D[2, 2] * W[1, 1]],
+        ]
+    )
 
 
 @ti.func
@@ -182,7 +197,9 @@ def solve_wheelset(
     table: Array, wheelset_compliance: Array, rail_compliance: Array, motion: Array, rail_free: Array, contact: Array,
     force: Array, wheelset_force: Array, rail_force: Array, wheelset_before: Array, rail_before: Array,
 ):  # fmt: skip
-    """Newton's method for the eight local forces of one wheelset; returns the number of iterations.
+    """Newton's method for the local forces of one wheelset; returns the number of iterations.
+
+    Unknowns are N, Fx, Fy of both wheels; the small spin moments follow the law from one iteration to the next.
 
     Everything that changes from one iteration to the next is local: Taichi 1.7.4 takes a load with a literal index and a
     store with a running one for different places and moves the load out of the loop.
@@ -195,15 +212,15 @@ def solve_wheelset(
     for m in ti.static(range(5)):
         before[m] = wheelset_before[b, wheelset, m]
     f_l, f_r = stored_force(b, wheelset, 0, 4, force), stored_force(b, wheelset, 1, 4, force)
-    left, right = stored_state(b, wheelset, 0, contact), stored_state(b, wheelset, 1, contact)
+    place_l, place_r = stored_place(b, wheelset, 0, contact), stored_place(b, wheelset, 1, contact)
     r0, b0, h_r = wheel[wheelset, 0], wheel[wheelset, 1], constants[at.ARM_HEAD]
     rolls = dims[at.CROSS_LEVEL_ROLLS]
     tolerance = constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD]
     iterations = 0
     change = 2.0 * tolerance
     while change > tolerance and iterations < ITERATIONS:
-        B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, left)
-        B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, right)
+        B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, place_l)
+        B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, place_r)
         increment = B_l @ f_l + B_r @ f_r - before
         a = ti.Vector.zero(ti.f64, 5)
         for m in ti.static(range(5)):
@@ -215,37 +232,40 @@ def solve_wheelset(
         rail_r = rail_at_end(wheelset, free_r, R_r @ f_r - before_r, constants, rail_compliance)
         left = state_of(0, V, r0, b0, x, dx, rail_l, irregularity, rolls, table, constants)
         right = state_of(1, V, r0, b0, x, dx, rail_r, irregularity, rolls, table, constants)
+        store_state(b, wheelset, 0, left, contact)
+        store_state(b, wheelset, 1, right, contact)
+        place_l, place_r = wr.placing(left), wr.placing(right)
         law_l, D_l = wr.contact_law(left, constants[at.FRICTION])
         law_r, D_r = wr.contact_law(right, constants[at.FRICTION])
-        J = ti.Matrix.identity(ti.f64, 8)
-        residual = ti.Vector.zero(ti.f64, 8)
-        ll = D_l @ response(1, wheelset, V, constants, B_l, R_l, B_l, left[wr.COS], wheelset_compliance, rail_compliance)
-        lr = D_l @ response(0, wheelset, V, constants, B_l, R_l, B_r, left[wr.COS], wheelset_compliance, rail_compliance)
-        rl = D_r @ response(0, wheelset, V, constants, B_r, R_r, B_l, right[wr.COS], wheelset_compliance, rail_compliance)
-        rr = D_r @ response(1, wheelset, V, constants, B_r, R_r, B_r, right[wr.COS], wheelset_compliance, rail_compliance)
-        for m in ti.static(range(4)):
+        ll = feedback(1, wheelset, V, constants, D_l, B_l, R_l, B_l, left[wr.COS], wheelset_compliance, rail_compliance)
+        lr = feedback(0, wheelset, V, constants, D_l, B_l, R_l, B_r, left[wr.COS], wheelset_compliance, rail_compliance)
+        rl = feedback(0, wheelset, V, constants, D_r, B_r, R_r, B_l, right[wr.COS], wheelset_compliance, rail_compliance)
+        rr = feedback(1, wheelset, V, constants, D_r, B_r, R_r, B_r, right[wr.COS], wheelset_compliance, rail_compliance)
+        J = ti.Matrix.identity(ti.f64, 6)
+        residual = ti.Vector.zero(ti.f64, 6)
+        for m in ti.static(range(3)):
             residual[m] = law_l[m] - f_l[m]
-            residual[4 + m] = law_r[m] - f_r[m]
-            for n in ti.static(range(4)):
+            residual[3 + m] = law_r[m] - f_r[m]
+            for n in ti.static(range(3)):
                 J[m, n] -= ll[m, n]
-                J[m, 4 + n] -= lr[m, n]
-                J[4 + m, n] -= rl[m, n]
-                J[4 + m, 4 + n] -= rr[m, n]
-        step = solve8(J, residual)
+                J[m, 3 + n] -= lr[m, n]
+                J[3 + m, n] -= rl[m, n]
+                J[3 + m, 3 + n] -= rr[m, n]
+        step = solve6(J, residual)
         change = 0.0
-        for m in ti.static(range(4)):
+        for m in ti.static(range(3)):
             f_l[m] += step[m]
-            f_r[m] += step[4 + m]
-            if ti.static(m < 3):
-                change = ti.max(change, ti.max(ti.abs(step[m]), ti.abs(step[4 + m])))
+            f_r[m] += step[3 + m]
+            change = ti.max(change, ti.max(ti.abs(step[m]), ti.abs(step[3 + m])))
+        f_l[3], f_r[3] = law_l[3], law_r[3]
         iterations += 1
-    B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, left)
-    B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, right)
+    B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, place_l)
+    B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, place_r)
     q = B_l @ f_l + B_r @ f_r
     for m in ti.static(range(5)):
         wheelset_force[b, wheelset, m] = q[m]
-    store(b, wheelset, 0, left, f_l, R_l @ f_l, contact, force, rail_force)
-    store(b, wheelset, 1, right, f_r, R_r @ f_r, contact, force, rail_force)
+    store_force(b, wheelset, 0, f_l, R_l @ f_l, force, rail_force)
+    store_force(b, wheelset, 1, f_r, R_r @ f_r, force, rail_force)
     return iterations
 
 
@@ -320,10 +340,12 @@ def wheel_forces(
             )
             f_l, _ = wr.contact_law(left, constants[at.FRICTION])
             f_r, _ = wr.contact_law(right, constants[at.FRICTION])
-            B_l, R_l = wr.force_directions(-1.0, wheel[w, 0], wheel[w, 1], constants[at.ARM_HEAD], left)
-            B_r, R_r = wr.force_directions(1.0, wheel[w, 0], wheel[w, 1], constants[at.ARM_HEAD], right)
+            B_l, R_l = wr.force_directions(-1.0, wheel[w, 0], wheel[w, 1], constants[at.ARM_HEAD], wr.placing(left))
+            B_r, R_r = wr.force_directions(1.0, wheel[w, 0], wheel[w, 1], constants[at.ARM_HEAD], wr.placing(right))
             q = B_l @ f_l + B_r @ f_r
             for m in ti.static(range(5)):
                 wheelset_force_out[b, w, m] = q[m]
-            store(b, w, 0, left, f_l, R_l @ f_l, contact_out, force_out, rail_force_out)
-            store(b, w, 1, right, f_r, R_r @ f_r, contact_out, force_out, rail_force_out)
+            store_state(b, w, 0, left, contact_out)
+            store_state(b, w, 1, right, contact_out)
+            store_force(b, w, 0, f_l, R_l @ f_l, force_out, rail_force_out)
+            store_force(b, w, 1, f_r, R_r @ f_r, force_out, rail_force_out)

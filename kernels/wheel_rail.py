@@ -45,8 +45,8 @@ def lookup(u: float, alpha: float, table: Array, constants: Array):
     wx = catmull_rom(ti.min(ti.max(x - i, 0.0), 1.0))
     wy = catmull_rom(ti.min(ti.max(y - j, 0.0), 1.0))
     value = ti.Vector.zero(ti.f64, at.N_TABLE)
-    for m in ti.static(range(4)):
-        for n in ti.static(range(4)):
+    for m in range(4):
+        for n in range(4):
             weight = wx[m] * wy[n]
             for column in ti.static(range(at.N_TABLE)):
                 value[column] += weight * table[i + m - 1, j + n - 1, column]
@@ -179,13 +179,19 @@ def contact_law(state: ti.template(), friction: float):
 
 
 @ti.func
-def force_directions(sigma: float, r0: float, b0: float, h_r: float, state: ti.template()):
+def placing(state: ti.template()):
+    """What the directions of a wheel's forces depend on: sin and cos of gamma_t, s_w, s_r, r_c."""
+    return ti.Vector([state[SIN], state[COS], state[S_W], state[S_R], state[R_C]])
+
+
+@ti.func
+def force_directions(sigma: float, r0: float, b0: float, h_r: float, place: ti.template()):
     """Generalised forces of unit (N, Fx, Fy, Mz): on the wheelset (5, 4) and on the rail's w, v, theta_x (3, 4).
 
     The arms are those of the actual contact point: (sigma (b0 + s_w), r_c) on the wheelset, (sigma s_r, -h_c) on the rail.
     """
-    s, c = state[SIN], state[COS]
-    arm, r, s_r = b0 + state[S_W], state[R_C], state[S_R]
+    s, c = place[0], place[1]
+    arm, r, s_r = b0 + place[2], place[4], place[3]
     h_c = h_r - (r - r0)
     wheelset = ti.Matrix(
         [

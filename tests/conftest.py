@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import pytest
 
 from tiengine import backend
+
+sys.path.append(
+    str(Path(__file__).parents[1])
+)  # validation's closed forms; last, so that the installed engine is tested
 
 
 @pytest.fixture(scope="session", autouse=True)

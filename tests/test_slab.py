@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from tiengine.mortar import Mortar, MortarVoid
 from tiengine.quantity import InputError, build
 from tiengine.slab import GRAVITY, Slab, SlabMatrices, load_slab, slab_designs, slab_matrices, slab_names
-
-from .reference.plate_ritz import frequencies
+from validation.closed_forms.plate_ritz import frequencies
 
 ROUNDING = np.finfo(float).eps
 

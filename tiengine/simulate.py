@@ -74,11 +74,15 @@ def run(
         return _run(scenario, path, force, progress, public_launch)
 
 
-def prepare(scenario: Scenario) -> Model:
+def prepare(scenario: Scenario, public_launch: bool = False) -> tuple[Model, float]:
     """Build the model of a scenario with a stable time step.
 
     Args:
         scenario: Checked scenario.
+        public_launch: Public Taichi calls only.
+
+    Returns:
+        The model, and the wall time of compiling the step's kernels [s].
 
     Raises:
         InputError: The step asked for is unstable or too long for the irregularity, or none is short enough.
@@ -87,6 +91,7 @@ def prepare(scenario: Scenario) -> Model:
     asked = scenario.numerics.time_step
     V = scenario.train.speed.at(0.0)[0]
     fastest = scenario.train.speed.fastest
+    jit = 0.0
     for dt in AUTO_STEPS if asked == "auto" else (float(asked),):
         try:
             check_wavelength(scenario, dt)
@@ -95,11 +100,13 @@ def prepare(scenario: Scenario) -> Model:
                 continue
             raise
         model = build_model(ingredients(scenario, dt), fastest)
+        if jit == 0.0:
+            jit = Stepper(model, State.at_rest(model), Chunk.empty(model, 1, 1, 1), public=public_launch).compile()
         growth = energy_growth(model, fastest)
         if growth <= TOLERATED_GROWTH:
             if V != fastest:
                 model.refactor(V)
-            return model
+            return model, jit
     raise InputError(
         f"numerics.time_step = {asked}: unstable; free vibration of the track grows by a factor {growth:.3g} within"
         " 80 steps; choose a shorter step, more passes or fewer modes_per_metre"
@@ -109,7 +116,7 @@ def prepare(scenario: Scenario) -> Model:
 def _run(scenario: Scenario, path: Path | None, force: bool, progress: Progress | None, public: bool) -> Result:
     """Everything after the checks."""
     started = time.perf_counter()
-    model = prepare(scenario)
+    model, jit = prepare(scenario, public)
     dt = model.given.newmark.dt
     recorder = Recorder(scenario, dt)
     speed = scenario.train.speed
@@ -123,7 +130,7 @@ def _run(scenario: Scenario, path: Path | None, force: bool, progress: Progress 
     chunk = Chunk.empty(model, CHUNK_STEPS, *rows)
     irregularity = make_irregularity(scenario.irregularity, float(model.wheel_s.max()))
     stepper = Stepper(model, state, chunk, public=public)
-    jit = stepper.compile()
+    jit += stepper.compile()
     setup = time.perf_counter() - started - jit
     times = {"import": IMPORT_SECONDS, "jit": jit, "setup": setup}
     attributes = {**_facts(scenario, model), "status": "running"}

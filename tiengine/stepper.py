@@ -93,6 +93,7 @@ class Stepper:
         )  # fmt: skip
         self._speed = float("nan")
         self._views = {name: (self._flat(at.F, name), self._flat(at.X, name)) for name in _BLOCKS}
+        self._window: tuple[int, int] | None = None
         self._odd: list[tuple[int, int, int]] = []
 
     def compile(self) -> float:
@@ -147,7 +148,8 @@ class Stepper:
 
     def _move(self, first_seat: int, first_slab: int, V: float) -> None:
         """Let seats and slabs in and out; factorise anew when the speed has changed enough."""
-        if first_seat != self.state.first_seat or first_slab != self.state.first_slab:
+        if (first_seat, first_slab) != self._window:  # the first step too: the start has let the first slabs in
+            self._window = first_seat, first_slab
             self.state.enter(self.model, first_seat, first_slab)
             self._odd = [(int(b), int(s), int(self.state.design[b, s])) for b, s in np.argwhere(self.state.design)]
         if V != self._speed and not abs(V - self._speed) < REFACTOR * self._speed:

@@ -65,23 +65,47 @@ class SemiDiscrete:
                 np.add.at(self.on_slab[i, side, 1], base + sound.seat_index[j, side], b * sound.seat_slope[j, side])
                 self.on_slab[i, side, 2, base + self.slab_dofs - 2 : base + self.slab_dofs] = 1.0, sound.seat_x[j]
         self.k = np.array([f.vertical_stiffness, f.vertical_stiffness, f.lateral_stiffness])
+        self.arms = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, b], [0.0, 1.0, -g.rail.arm_fastening]])  # on w, v, theta_x
         self.c = np.array([f.vertical_damping, f.vertical_damping, f.lateral_damping])
 
+    def shapes(self, t: float) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
+        """Which seats stand in the window at time t, the rails' shape there and its rate -V d/ds."""
+        s = (self.seats + 0.5) * self.model.given.slab.fastening_pitch - self.V * t
+        here = (s > 0.0) & (s < self.model.given.length)
+        k = self.model.window.wave_numbers
+        return here, np.sin(np.outer(s[here], k)), -self.V * k * np.cos(np.outer(s[here], k))
+
+    def fastening_forces(
+        self, t: float, u: NDArray[np.float64], v: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Generalised forces of all fastenings, shape (n,)."""
+        here, phi, rate = self.shapes(t)
+        rail_u, rail_v = (x[: self.first_slab_dof].reshape(2, 5, -1)[:, [0, 2, 4]] for x in (u, v))
+        W, D = phi @ rail_u.swapaxes(1, 2), phi @ rail_v.swapaxes(1, 2) + rate @ rail_u.swapaxes(1, 2)
+        on_slab = self.on_slab[here][..., self.first_slab_dof : self.first_vehicle_dof].reshape(
+            -1, self.first_vehicle_dof - self.first_slab_dof
+        )
+        slab_u, slab_v = ((on_slab @ x[self.first_slab_dof : self.first_vehicle_dof]).reshape(-1, 2, 3) for x in (u, v))
+        e = (W @ self.arms.T).swapaxes(0, 1) - slab_u
+        de = (D @ self.arms.T).swapaxes(0, 1) - slab_v
+        force = self.k * e + self.c * de
+        out = np.zeros(self.n)
+        rails = out[: self.first_slab_dof].reshape(2, 5, -1)
+        rails[:, [0, 2, 4]] = -np.einsum("srm,mf,sn->rfn", force, self.arms, phi)
+        out[self.first_slab_dof : self.first_vehicle_dof] = force.ravel() @ on_slab
+        return out
+
     def fastenings(self, t: float) -> tuple[NDArray[np.float64], ...]:
-        """E and F at time t: elongations E u, their rates E u' + F u; with k and c by row."""
-        g, n = self.model.given, self.modes
-        s = (self.seats + 0.5) * g.slab.fastening_pitch - self.V * t
-        here = (s > 0.0) & (s < g.length)
-        s, E = s[here], -self.on_slab[here]
-        F = np.zeros_like(E)
-        k = np.arange(1, n + 1) * np.pi / g.length
-        phi, rate = np.sin(np.outer(s, k)), -self.V * k * np.cos(np.outer(s, k))
+        """As matrices: elongations E u, their rates E u' + F u; with k and c by row."""
+        here, phi, rate = self.shapes(t)
+        E = -self.on_slab[here]
+        F, n = np.zeros_like(E), self.modes
         for side in range(2):
-            w, v, roll = (5 * n * side + field * n for field in (0, 2, 4))
-            for kind, base, arm in ((0, w, 1.0), (1, roll, g.rail.half_base), (2, v, 1.0), (2, roll, -g.rail.arm_fastening)):
+            for kind, field in np.argwhere(self.arms):
+                base, arm = (5 * side + 2 * field) * n, self.arms[kind, field]
                 E[:, side, kind, base : base + n] = arm * phi
                 F[:, side, kind, base : base + n] = arm * rate
-        rows = 2 * int(here.sum())
+        rows = 2 * len(phi)
         return E.reshape(-1, self.n), F.reshape(-1, self.n), np.tile(self.k, rows), np.tile(self.c, rows)
 
     def under_wheels(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -103,8 +127,7 @@ class SemiDiscrete:
     def rhs(self, t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """dy/dt."""
         u, v = y[: self.n], y[self.n :]
-        E, F, k, c = self.fastenings(t)
-        f = -self.C @ v - self.K @ u - E.T @ (k * (E @ u) + c * (E @ v + F @ u))
+        f = self.fastening_forces(t, u, v) - self.C @ v - self.K @ u
         found = self.contact(t, y)
         np.add.at(f, self.dof, found.wheelset[0])
         f[: self.first_slab_dof] += self._on_rails(found.rail[0])

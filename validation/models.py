@@ -1,0 +1,18 @@
+"""Models of the paper's case that several files look into without running them."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from tiengine.model import Model, build_model
+from tiengine.scenario import load_scenario
+from tiengine.setup import ingredients
+
+__all__ = ["paper_model"]
+
+
+@cache
+def paper_model(*overrides: str, dt: float = 2e-4) -> Model:
+    """Model of the paper's case with changes, at a time step dt [s], as it starts."""
+    scenario = load_scenario("paper", overrides)
+    return build_model(ingredients(scenario, dt), scenario.train.speed.at(0.0)[0])
