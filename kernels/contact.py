@@ -15,13 +15,13 @@ import taichi as ti
 
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
-from tiengine.kernels.types import Array, Reals1, Reals2, Reals3, Reals4
+from tiengine.kernels.types import Array, Reals1, Reals2, Reals3, Reals4, Template
 
 ITERATIONS = 25
 
 
 @ti.func
-def solve6(matrix: ti.template(), rhs: ti.template()):
+def solve6(matrix: Template, rhs: Template):
     """Gaussian elimination with the pivots on the diagonal: the matrix is the identity plus a dissipative part."""
     for k in range(6):
         inverse = 1.0 / matrix[k, k]
@@ -50,7 +50,7 @@ def wheelset_coordinates(b: int, wheelset: int, dims: Array, dof: Array, row: in
 
 @ti.func
 def rail_coordinates(b: int, wheelset: int, rail: int, dims: Array, shape: Array, motion: Array, rail_out: Array):
-    """Rail under a wheel: w, v, theta_x, their slopes and their rates at constant s, into ``rail_out[b, wheelset, rail]``."""
+    """Rail under a wheel, into ``rail_out[b, wheelset, rail]``: w, v, theta_x, their slopes, their rates at constant s."""
     n = dims[at.MODES]
     w = (b * 2 + rail) * 2 * n
     v = dims[at.LATERAL] + (b * 2 + rail) * 3 * n
@@ -71,7 +71,7 @@ def rail_coordinates(b: int, wheelset: int, rail: int, dims: Array, shape: Array
 
 
 @ti.func
-def stored_place(b: int, wheelset: int, side: ti.template(), contact: Array):
+def stored_place(b: int, wheelset: int, side: Template, contact: Array):
     """Contact geometry of a wheel as the last evaluation left it."""
     place = ti.Vector.zero(ti.f64, 5)
     for m in ti.static(range(5)):
@@ -80,7 +80,7 @@ def stored_place(b: int, wheelset: int, side: ti.template(), contact: Array):
 
 
 @ti.func
-def stored_rail(b: int, wheelset: int, side: ti.template(), rail: Array):
+def stored_rail(b: int, wheelset: int, side: Template, rail: Array):
     """Rail motion under a wheel: w, v, theta_x, slopes, rates at constant s."""
     r = ti.Vector.zero(ti.f64, 9)
     for m in ti.static(range(9)):
@@ -89,7 +89,7 @@ def stored_rail(b: int, wheelset: int, side: ti.template(), rail: Array):
 
 
 @ti.func
-def stored_force(b: int, wheelset: int, side: ti.template(), count: ti.template(), force: Array):
+def stored_force(b: int, wheelset: int, side: Template, count: Template, force: Array):
     """The first ``count`` force components of a wheel."""
     f = ti.Vector.zero(ti.f64, count)
     for m in ti.static(range(count)):
@@ -98,7 +98,7 @@ def stored_force(b: int, wheelset: int, side: ti.template(), count: ti.template(
 
 
 @ti.func
-def store_state(b: int, wheelset: int, side: ti.template(), state: ti.template(), contact_out: Array):
+def store_state(b: int, wheelset: int, side: Template, state: Template, contact_out: Array):
     """Leave a wheel's contact state in memory."""
     for m in ti.static(range(wr.N_CONTACT)):
         contact_out[b, wheelset, side, m] = state[m]
@@ -106,7 +106,7 @@ def store_state(b: int, wheelset: int, side: ti.template(), state: ti.template()
 
 @ti.func
 def store_force(
-    b: int, wheelset: int, side: ti.template(), f: ti.template(), r: ti.template(), force_out: Array, rail_force_out: Array
+    b: int, wheelset: int, side: Template, f: Template, r: Template, force_out: Array, rail_force_out: Array
 ):
     """Leave a wheel's local forces and its forces on the rail in memory."""
     for m in ti.static(range(4)):
@@ -116,7 +116,7 @@ def store_force(
 
 
 @ti.func
-def rail_at_end(wheelset: int, free: ti.template(), increment: ti.template(), constants: Array, compliance: Array):
+def rail_at_end(wheelset: int, free: Template, increment: Template, constants: Array, compliance: Array):
     """Rail motion under a wheel at the end of the step, from that without the change of the wheel's force."""
     r = free
     for m in ti.static(range(3)):
@@ -132,8 +132,8 @@ def rail_at_end(wheelset: int, free: ti.template(), increment: ti.template(), co
 
 @ti.func
 def state_of(
-    side: ti.template(), V: float, r0: float, b0: float, x: ti.template(), dx: ti.template(), rail: ti.template(),
-    irregularity: ti.template(), rolls: int, table: Array, constants: Array,
+    side: Template, V: float, r0: float, b0: float, x: Template, dx: Template, rail: Template,
+    irregularity: Template, rolls: int, table: Array, constants: Array,
 ):  # fmt: skip
     """Contact state of the left (0) or right (1) wheel."""
     return wr.contact_state(
@@ -155,8 +155,8 @@ def state_of(
 
 @ti.func
 def feedback(
-    same: ti.template(), wheelset: int, V: float, constants: Array, D: ti.template(), B: ti.template(), R: ti.template(),
-    other: ti.template(), cos: float, wheelset_compliance: Array, rail_compliance: Array,
+    same: Template, wheelset: int, V: float, constants: Array, D: Template, B: Template, R: Template,
+    other: Template, cos: float, wheelset_compliance: Array, rail_compliance: Array,
 ):  # fmt: skip
     """D W for (N, Fx, Fy): what the law of one wheel answers to unit forces of itself (``same``) or of the other wheel.
 
@@ -193,7 +193,7 @@ def feedback(
 
 @ti.func
 def solve_wheelset(
-    b: int, wheelset: int, V: float, irregularity: ti.template(), dims: Array, constants: Array, wheel: Array, dof: Array,
+    b: int, wheelset: int, V: float, irregularity: Template, dims: Array, constants: Array, wheel: Array, dof: Array,
     table: Array, wheelset_compliance: Array, rail_compliance: Array, motion: Array, rail_free: Array, contact: Array,
     force: Array, wheelset_force: Array, rail_force: Array, wheelset_before: Array, rail_before: Array,
 ):  # fmt: skip
@@ -201,8 +201,8 @@ def solve_wheelset(
 
     Unknowns are N, Fx, Fy of both wheels; the small spin moments follow the law from one iteration to the next.
 
-    Everything that changes from one iteration to the next is local: Taichi 1.7.4 takes a load with a literal index and a
-    store with a running one for different places and moves the load out of the loop.
+    Everything that changes from one iteration to the next is local: Taichi 1.7.4 takes a load with a literal index
+    and a store with a running one for different places and moves the load out of the loop.
     """
     x_free = wheelset_coordinates(b, wheelset, dims, dof, at.U, motion)
     dx_free = wheelset_coordinates(b, wheelset, dims, dof, at.V, motion)
@@ -239,8 +239,12 @@ def solve_wheelset(
         law_r, D_r = wr.contact_law(right, constants[at.FRICTION])
         ll = feedback(1, wheelset, V, constants, D_l, B_l, R_l, B_l, left[wr.COS], wheelset_compliance, rail_compliance)
         lr = feedback(0, wheelset, V, constants, D_l, B_l, R_l, B_r, left[wr.COS], wheelset_compliance, rail_compliance)
-        rl = feedback(0, wheelset, V, constants, D_r, B_r, R_r, B_l, right[wr.COS], wheelset_compliance, rail_compliance)
-        rr = feedback(1, wheelset, V, constants, D_r, B_r, R_r, B_r, right[wr.COS], wheelset_compliance, rail_compliance)
+        rl = feedback(
+            0, wheelset, V, constants, D_r, B_r, R_r, B_l, right[wr.COS], wheelset_compliance, rail_compliance
+        )
+        rr = feedback(
+            1, wheelset, V, constants, D_r, B_r, R_r, B_r, right[wr.COS], wheelset_compliance, rail_compliance
+        )
         J = ti.Matrix.identity(ti.f64, 6)
         residual = ti.Vector.zero(ti.f64, 6)
         for m in ti.static(range(3)):

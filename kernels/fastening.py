@@ -136,7 +136,9 @@ def seat_forces(
                     r[m] = seat_motion[b, rail * 6 + m, j]
                 now = ti.Vector([0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
                 if slab < first_slab + slots:  # beyond the modelled slabs the ground is rigid
-                    before = slab_motion(base, dofs, seat, rail, motion, index, shape, x, at.U_PREDICTED, at.V_PREDICTED)
+                    before = slab_motion(
+                        base, dofs, seat, rail, motion, index, shape, x, at.U_PREDICTED, at.V_PREDICTED
+                    )
                     load = seat_force(r, before, scale[b, j, rail], constants)
                     for m in range(12):
                         q = base + index[seat, rail, m]
@@ -157,7 +159,9 @@ def seat_forces(
 
 
 @ti.func
-def scatter(b: int, n: int, seats: int, lateral: int, s0: float, length: float, table: Array, force: Array, motion: Array):
+def scatter(
+    b: int, n: int, seats: int, lateral: int, s0: float, length: float, table: Array, force: Array, motion: Array
+):
     """Subtract the seat forces from the rails' right-hand sides: row-dot products of length ``seats``."""
     for i in range(n):
         k = (i + 1) * ti.math.pi / length
@@ -184,8 +188,12 @@ def scatter(b: int, n: int, seats: int, lateral: int, s0: float, length: float, 
 def add_smeared(b: int, n: int, lateral: int, constants: Array, motion: Array):
     """Add (beta dt^2 K_s + gamma dt C_s) a of the smeared fastenings that stand in the rails' implicit blocks."""
     per_mode = constants[at.SMEARING] * constants[at.LENGTH] / (2.0 * constants[at.SPACING])
-    kv = per_mode * (constants[at.BETA_DT2] * constants[at.K_VERTICAL] + constants[at.GAMMA_DT] * constants[at.C_VERTICAL])
-    kl = per_mode * (constants[at.BETA_DT2] * constants[at.K_LATERAL] + constants[at.GAMMA_DT] * constants[at.C_LATERAL])
+    kv = per_mode * (
+        constants[at.BETA_DT2] * constants[at.K_VERTICAL] + constants[at.GAMMA_DT] * constants[at.C_VERTICAL]
+    )
+    kl = per_mode * (
+        constants[at.BETA_DT2] * constants[at.K_LATERAL] + constants[at.GAMMA_DT] * constants[at.C_LATERAL]
+    )
     a, half = constants[at.ARM_FASTENING], constants[at.HALF_BASE]
     for rail in range(2):
         for i in range(n):
@@ -194,7 +202,9 @@ def add_smeared(b: int, n: int, lateral: int, constants: Array, motion: Array):
             foot = motion[at.A, v] - a * motion[at.A, v + 2 * n]
             motion[at.F, w] = motion[at.F, w] + kv * motion[at.A, w]
             motion[at.F, v] = motion[at.F, v] + kl * foot
-            motion[at.F, v + 2 * n] = motion[at.F, v + 2 * n] - a * kl * foot + half * half * kv * motion[at.A, v + 2 * n]
+            motion[at.F, v + 2 * n] = (
+                motion[at.F, v + 2 * n] - a * kl * foot + half * half * kv * motion[at.A, v + 2 * n]
+            )
 
 
 @ti.func

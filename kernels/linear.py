@@ -8,7 +8,7 @@ from tiengine.kernels.types import Array, Ints1, Ints2, Reals2, Reals4
 
 @ti.func
 def slab_linear_forces(b: int, dims: Array, design: Array, band: Array, motion: Array):
-    """Write -(C v + K u) of every slab of train ``b`` into ``motion[LINEAR]``; matrices are banded, one pair a design."""
+    """Write -(C v + K u) of every slab of train ``b`` into ``motion[LINEAR]``; banded matrices, one pair a design."""
     n, half = dims[at.SLAB_DOFS], dims[at.HALF_BAND]
     for slot in range(dims[at.SLOTS]):
         base = dims[at.SLABS] + (b * dims[at.SLOTS] + slot) * n

@@ -10,25 +10,27 @@ that is -(C v + K u) with C = -2 V mu G, K = K_el + mu (V^2 int W W'' - dV/dt G)
 import taichi as ti
 
 from tiengine.kernels import layout as at
-from tiengine.kernels.types import Array, Ints1, Reals1, Reals2, Reals3
+from tiengine.kernels.types import Array, Ints1, Reals1, Reals2, Reals3, Template
 
 # Columns of ``stiffness[i, :]``: elastic coefficients of mode i, then the squared wave number.
 WW, W_THETA, THETA_Y, VV, V_THETA, THETA_Z, TORSION, WAVE2 = range(8)
 
 
 @ti.func
-def convective(base: int, n: int, i: int, V: float, V_rate: float, G: Array, kind: ti.template(), motion: Array):
+def convective(base: int, n: int, i: int, V: float, V_rate: float, G: Array, kind: Template, motion: Array):
     """Sum_j G_ij (2 V du_j/dt + dV/dt u_j) for the field that begins at ``base``; kind 0 sine, 1 cosine."""
     total = 0.0
     for j in range(n):
-        total += G[kind, i, j] * (2.0 * V * motion[at.V_PREDICTED, base + j] + V_rate * motion[at.U_PREDICTED, base + j])
+        total += G[kind, i, j] * (
+            2.0 * V * motion[at.V_PREDICTED, base + j] + V_rate * motion[at.U_PREDICTED, base + j]
+        )
     return total
 
 
 @ti.func
 def field_force(
     base: int, n: int, i: int, V: float, V_rate: float, half_mass: float, per_length: float, k2: float, G: Array,
-    kind: ti.template(), motion: Array,
+    kind: Template, motion: Array,
 ):  # fmt: skip
     """Convective force of one field: half_mass = mu l/2."""
     return half_mass * V * V * k2 * motion[at.U_PREDICTED, base + i] + half_mass * per_length * convective(
@@ -38,7 +40,16 @@ def field_force(
 
 @ti.func
 def rail_linear_forces(
-    b: int, n: int, lateral: int, V: float, V_rate: float, length: float, stiffness: Array, mass: Array, G: Array, motion: Array
+    b: int,
+    n: int,
+    lateral: int,
+    V: float,
+    V_rate: float,
+    length: float,
+    stiffness: Array,
+    mass: Array,
+    G: Array,
+    motion: Array,
 ):
     """Write -(C v + K u) of both rails of train ``b`` at the predictors into ``motion[LINEAR]``."""
     per_length = 2.0 / length
@@ -68,7 +79,9 @@ def rail_linear_forces(
 
 
 @ti.kernel
-def rail_forces(V: float, V_rate: float, dims: Ints1, constants: Reals1, stiffness: Reals2, mass: Reals1, G: Reals3, motion: Reals2):
+def rail_forces(
+    V: float, V_rate: float, dims: Ints1, constants: Reals1, stiffness: Reals2, mass: Reals1, G: Reals3, motion: Reals2
+):
     """Write the linear forces of all rails at the predictors into ``motion[LINEAR]`` (serial; the step fuses this).
 
     Args:

@@ -17,11 +17,11 @@ from tiengine.kernels import contact as ct
 from tiengine.kernels import fastening as fs
 from tiengine.kernels import layout as at
 from tiengine.kernels import linear, mortar, rail, suspension
-from tiengine.kernels.types import Array, Ints1, Ints2, Ints3, Reals1, Reals2, Reals3, Reals4, Reals5
+from tiengine.kernels.types import Array, Ints1, Ints2, Ints3, Reals1, Reals2, Reals3, Reals4, Reals5, Template
 
 
 @ti.func
-def segment(b: int, part: ti.template(), dims: Array):
+def segment(b: int, part: Template, dims: Array):
     """First column and length of train ``b`` in a block: 0 vertical, 1 lateral, 2 slabs, 3 vehicles."""
     count = 4 * dims[at.MODES]
     start = b * count
@@ -63,7 +63,7 @@ def start_from_linear(b: int, dims: Array, motion: Array):
 
 @ti.func
 def add_vehicle_forces(b: int, V_rate: float, dims: Array, load: Array, dof: Array, wheel: Array, motion: Array):
-    """Gravity, inertia of braking, and the gyroscopic pair of the wheelsets' pitch rates (their mean spin is linear)."""
+    """Gravity, inertia of braking, gyroscopic pair of the wheelsets' pitch rates (their mean spin is linear)."""
     n = dims[at.VEHICLE_DOFS]
     base = dims[at.VEHICLES] + b * n
     for i in range(n):
@@ -96,9 +96,16 @@ def update(b: int, dims: Array, constants: Array, motion: Array):
 
 @ti.func
 def add_contact_response(
-    b: int, dims: Array, vertical: Array, lateral: Array, vehicle: Array, wheelset_force: Array, rail_force: Array, motion: Array
+    b: int,
+    dims: Array,
+    vertical: Array,
+    lateral: Array,
+    vehicle: Array,
+    wheelset_force: Array,
+    rail_force: Array,
+    motion: Array,
 ):
-    """a += A^-1 times contact forces; the columns of A^-1 at the wheels are constant."""
+    """Add A^-1 times contact forces to a; the columns of A^-1 at the wheels are constant."""
     n, wheelsets = dims[at.MODES], dims[at.WHEELSETS]
     for side in range(2):
         w = (b * 2 + side) * 2 * n
@@ -111,7 +118,9 @@ def add_contact_response(
         for i in range(3 * n):
             total = 0.0
             for k in range(wheelsets):
-                total += lateral[i, 2 * k] * rail_force[b, k, side, 1] + lateral[i, 2 * k + 1] * rail_force[b, k, side, 2]
+                total += (
+                    lateral[i, 2 * k] * rail_force[b, k, side, 1] + lateral[i, 2 * k + 1] * rail_force[b, k, side, 2]
+                )
             motion[at.A, v + i] = motion[at.A, v + i] + total
     base = dims[at.VEHICLES] + b * dims[at.VEHICLE_DOFS]
     for i in range(dims[at.VEHICLE_DOFS]):
@@ -162,7 +171,7 @@ def record(
 
 @ti.kernel
 def explicit_forces(
-    parallel: ti.template(),
+    parallel: Template,
     tick: Ints1,
     dims: Ints1,
     constants: Reals1,
@@ -250,7 +259,7 @@ def explicit_forces(
 
 @ti.kernel
 def contact_and_update(
-    parallel: ti.template(),
+    parallel: Template,
     tick: Ints1,
     dims: Ints1,
     constants: Reals1,

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     Ints2 = NDArray[np.int32]
     Ints3 = NDArray[np.int32]
     Array = Any
+    Template = Any
 else:
     Reals1 = ti.types.ndarray(dtype=ti.f64, ndim=1)
     Reals2 = ti.types.ndarray(dtype=ti.f64, ndim=2)
@@ -32,3 +33,4 @@ else:
     Ints2 = ti.types.ndarray(dtype=ti.i32, ndim=2)
     Ints3 = ti.types.ndarray(dtype=ti.i32, ndim=3)
     Array = ti.template()  # an array handed on to a ti.func
+    Template = ti.template()  # a vector, matrix or compile-time constant handed on to a ti.func

@@ -11,15 +11,13 @@ cross level at the wheel, D the material rate d/dt - V d/ds of the rail.
 import taichi as ti
 
 from tiengine.kernels import layout as at
-from tiengine.kernels.types import Array
+from tiengine.kernels.types import Array, Template
 
 # A wheel's contact state: what geometry and kinematics leave for the law and for the force directions.
-(DELTA, XI_X, XI_Y, XI_S, SIN, COS, S_W, S_R, R_C, KH, K11, K22, K23, K33, SHIFT, Z_IRR, Y_IRR, RAIL_W, N_CONTACT) = range(
-    19
+(DELTA, XI_X, XI_Y, XI_S, SIN, COS, S_W, S_R, R_C, KH, K11, K22, K23, K33, SHIFT, Z_IRR, Y_IRR, RAIL_W, N_CONTACT) = (
+    range(19)
 )
 
-Vector5 = ti.types.vector(5, ti.f64)
-Vector3 = ti.types.vector(3, ti.f64)
 
 
 @ti.func
@@ -59,12 +57,12 @@ def contact_state(
     V: float,
     r0: float,
     b0: float,
-    x: Vector5,
-    dx: Vector5,
-    rail: Vector3,
-    rail_slope: Vector3,
-    rail_rate: Vector3,
-    irregularity: ti.template(),
+    x: Template,
+    dx: Template,
+    rail: Template,
+    rail_slope: Template,
+    rail_rate: Template,
+    irregularity: Template,
     rolls: int,
     table: Array,
     constants: Array,
@@ -111,7 +109,9 @@ def contact_state(
     )
 
     # Across, the rail head's material velocity counts. Down, a wheel that follows the rail's shape rolls on it.
-    across = dx[0] - V * x[4] - dx[2] * r_c - (rail_rate[1] - V * rail_slope[1]) - h_c * (rail_rate[2] - V * rail_slope[2])
+    across = (
+        dx[0] - V * x[4] - dx[2] * r_c - (rail_rate[1] - V * rail_slope[1]) - h_c * (rail_rate[2] - V * rail_slope[2])
+    )
     advance = V * (s / c) * (x[4] - rail_slope[1] - h_c * rail_slope[2] - y_slope)
     down = (
         dx[1]
@@ -141,7 +141,7 @@ def saturation(tau: float):
 
 
 @ti.func
-def contact_law(state: ti.template(), friction: float):
+def contact_law(state: Template, friction: float):
     """Forces (N, Fx, Fy, Mz) on the wheel in the contact frame, and their derivatives by (delta, xi_x, xi_y, xi_s).
 
     Hertz N = K delta^1.5 (wheel lift: zero); linear creep forces f11 = c11 N^(2/3), f22 = c22 N^(2/3), f23 = c23 N,
@@ -179,13 +179,13 @@ def contact_law(state: ti.template(), friction: float):
 
 
 @ti.func
-def placing(state: ti.template()):
+def placing(state: Template):
     """What the directions of a wheel's forces depend on: sin and cos of gamma_t, s_w, s_r, r_c."""
     return ti.Vector([state[SIN], state[COS], state[S_W], state[S_R], state[R_C]])
 
 
 @ti.func
-def force_directions(sigma: float, r0: float, b0: float, h_r: float, place: ti.template()):
+def force_directions(sigma: float, r0: float, b0: float, h_r: float, place: Template):
     """Generalised forces of unit (N, Fx, Fy, Mz): on the wheelset (5, 4) and on the rail's w, v, theta_x (3, 4).
 
     The arms are those of the actual contact point: (sigma (b0 + s_w), r_c) on the wheelset, (sigma s_r, -h_c) on the rail.

@@ -44,8 +44,16 @@ class Blocks:
     def empty(cls, modes: int, wheelsets: int, vehicle: int) -> Blocks:
         """Arrays to be filled."""
         n, w = modes, wheelsets
-        shapes = (2 * n, 2 * n), (3 * n, 3 * n), (vehicle, vehicle), (2 * n, w), (3 * n, 2 * w), (vehicle, 5 * w)
-        return cls(*(np.zeros(shape) for shape in shapes), np.zeros((w, 5, 5)), np.zeros((w, 2, 3, 3)))
+        return cls(
+            vertical=np.zeros((2 * n, 2 * n)),
+            lateral=np.zeros((3 * n, 3 * n)),
+            vehicle=np.zeros((vehicle, vehicle)),
+            vertical_response=np.zeros((2 * n, w)),
+            lateral_response=np.zeros((3 * n, 2 * w)),
+            vehicle_response=np.zeros((vehicle, 5 * w)),
+            wheelset_compliance=np.zeros((w, 5, 5)),
+            rail_compliance=np.zeros((w, 2, 3, 3)),
+        )
 
     def fill(
         self,
@@ -69,9 +77,7 @@ class Blocks:
             wheel_shape: sin(k_i s) and its slope under the wheels, shape (2, W, N).
         """
         vertical, lateral = rail_inverses(window, fastening, spacing, newmark, V)
-        A = newmark.operator(
-            sp.csr_array(train.M), sp.csr_array(train.C + V * train.C_speed), sp.csr_array(train.K)
-        )
+        A = newmark.operator(sp.csr_array(train.M), sp.csr_array(train.C + V * train.C_speed), sp.csr_array(train.K))
         vehicle = inverse(A, "vehicle")
         self.vertical[:], self.lateral[:], self.vehicle[:] = vertical.T, lateral.T, vehicle.T
         n, value, slope = window.modes, wheel_shape[0], wheel_shape[1]

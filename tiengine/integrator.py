@@ -159,16 +159,12 @@ def seat_inverse_terms(
             slope[index[seat, side]] = shape[1, seat, side]
             vertical = np.outer(w, w) + half_base**2 * np.outer(slope, slope)
             across = np.outer(lateral, lateral)
-            K += scale[seat, side] * (
-                fastening.vertical_stiffness * vertical + fastening.lateral_stiffness * across
-            )
+            K += scale[seat, side] * (fastening.vertical_stiffness * vertical + fastening.lateral_stiffness * across)
             C += scale[seat, side] * (fastening.vertical_damping * vertical + fastening.lateral_damping * across)
     return sp.csr_array(K), sp.csr_array(C)
 
 
-def slab_operator(
-    K: NDArray[np.float64], C: NDArray[np.float64], half_band: int
-) -> NDArray[np.float64]:
+def slab_operator(K: NDArray[np.float64], C: NDArray[np.float64], half_band: int) -> NDArray[np.float64]:
     """K and C by diagonals, the layout of the slab kernel.
 
     Args:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -164,9 +165,7 @@ class Model:
     def refactor(self, V: float) -> None:
         """Fill the blocks that depend on the speed V [m/s]."""
         g = self.given
-        self.blocks.fill(
-            self.window, g.fastening, g.slab.fastening_pitch, g.train, g.newmark, V, self.wheel_shape
-        )
+        self.blocks.fill(self.window, g.fastening, g.slab.fastening_pitch, g.train, g.newmark, V, self.wheel_shape)
 
 
 def build_model(given: Ingredients, V: float) -> Model:
@@ -242,7 +241,7 @@ def _constants(given: Ingredients, window: RailWindow) -> NDArray[np.float64]:
     return c
 
 
-def _slab_arrays(given: Ingredients) -> dict[str, NDArray[np.float64] | NDArray[np.int32]]:
+def _slab_arrays(given: Ingredients) -> dict[str, Any]:
     """Operators, inverses and bed tables of every slab design."""
     designs, mortar = given.designs.matrices, given.mortar
     band, inverses = [], []

@@ -161,7 +161,7 @@ def _loop(
     failure = None
     while position < end - 1e-9 and failure is None:
         x, V, V_rate = speed.advance(position, dt, CHUNK_STEPS)
-        count = int(min(np.searchsorted(x, end - 1e-9), CHUNK_STEPS))
+        count = min(int(np.searchsorted(x, end - 1e-9)), CHUNK_STEPS)
         x, V, V_rate = x[1 : count + 1], V[1 : count + 1], V_rate[1 : count + 1]
         wheels = x[:, None] + model.given.train.wheelset_x
         stepper.load(x - model.centre_s, V, V_rate, irregularity.sample(wheels)[None])
@@ -176,7 +176,7 @@ def _loop(
             progress(done * dt, max(duration, done * dt))
     loop = time.perf_counter() - started
     times |= {"loop": loop, "writing": writing}
-    attributes = {f"wall_time_{name}": seconds for name, seconds in times.items()}
+    attributes: dict[str, Any] = {f"wall_time_{name}": seconds for name, seconds in times.items()}
     attributes |= {
         "status": "complete" if failure is None else failure,
         "simulated_time": done * dt,

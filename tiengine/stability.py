@@ -38,7 +38,7 @@ def energy_growth(model: Model, V: float) -> float:
     state = State.at_rest(model)
     chunk = Chunk.empty(model, STEPS, 1, 1)
     stepper = Stepper(model, state, chunk)
-    X = V * model.given.newmark.dt * np.arange(1, STEPS + 1)
+    X = np.arange(1.0, STEPS + 1.0) * (V * model.given.newmark.dt)
     stepper.load(X, np.full(STEPS, V), np.zeros(STEPS), np.zeros_like(chunk.irregularity))
     random = np.random.Generator(np.random.Philox(key=0))
     state.enter(model, int(chunk.clock[0, at.FIRST_SEAT]), int(chunk.clock[0, at.FIRST_SLAB]))
@@ -72,7 +72,9 @@ def _energy(model: Model, state: State) -> float:
         (lateral, mass[2:], (s[:, 3], s[:, 4], s[:, 5])),
     ):
         total += float(np.sum(masses[:, None] * v**2))
-        total += float(np.sum(k[0] * u[..., 0, :] ** 2 + 2 * k[1] * u[..., 0, :] * u[..., 1, :] + k[2] * u[..., 1, :] ** 2))
+        total += float(
+            np.sum(k[0] * u[..., 0, :] ** 2 + 2 * k[1] * u[..., 0, :] * u[..., 1, :] + k[2] * u[..., 1, :] ** 2)
+        )
     total += float(np.sum(s[:, 6] * lateral[0][..., 2, :] ** 2))
     slab = model.given.designs.matrices[0]
     u, v = state.view(at.U, "slabs"), state.view(at.V, "slabs")

@@ -142,9 +142,7 @@ class _Problem:
         self.pitch = self.train.wheelset_dof[:, 3]
         self.load = self.train.gravity + V_rate * self.train.acceleration_force
 
-    def split(
-        self, y: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def split(self, y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Coordinates (B, n), pitch rates (B, W), forces on the rails (B, W, 2, 3)."""
         n, W = self.train.n, len(self.pitch)
         x = y[:, :n].copy()
@@ -173,7 +171,7 @@ class _Problem:
         found = self.contact(y)
         out = np.broadcast_to(self.load, x.shape) - x @ self.train.K.T
         out = out - self.spread(rates) @ (self.train.C + self.V * self.train.C_speed).T
-        np.add.at(out, (slice(None), self.train.wheelset_dof), found.wheelset)
+        out[:, self.train.wheelset_dof] += found.wheelset
         return np.hstack([out, (found.rail - force).reshape(len(y), -1)])
 
     def solve(self) -> NDArray[np.float64]:

@@ -140,9 +140,7 @@ class Position:
         return self.clock[:, at.FIRST_SLAB].astype(np.int64)
 
 
-def positions(
-    model: Model, X: NDArray[np.float64], V: NDArray[np.float64], V_rate: NDArray[np.float64]
-) -> Position:
+def positions(model: Model, X: NDArray[np.float64], V: NDArray[np.float64], V_rate: NDArray[np.float64]) -> Position:
     """Where the window's seats and slabs stand.
 
     Seat j is at chainage (j + 1/2) d and enters at s = l; the rear seat has 0 < s_0 <= d. Slab K lies over

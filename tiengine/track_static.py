@@ -73,7 +73,8 @@ class StaticTrack:
             w, v, theta_x, their slopes, their (zero) rates at constant s, shape (B, W, 2, 9).
         """
         flat = force.reshape(len(force), -1)
-        return np.einsum("wrfk,bk->bwrf", self._compliance, flat)
+        under: NDArray[np.float64] = np.einsum("wrfk,bk->bwrf", self._compliance, flat)
+        return under
 
     def motion(self, force: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Generalised coordinates under wheel forces.
@@ -99,7 +100,7 @@ class StaticTrack:
         g = self.model.given
         d, per_slab = g.slab.fastening_pitch, g.slab.fastenings
         j = np.arange(state.seat_scale.shape[1])
-        s = s0 + j * d
+        s = np.asarray(s0 + j * d, dtype=np.float64)
         j = j[s < g.length]
         phi, slope = self.model.window.shape(s[j]), self.model.window.shape_slope(s[j])
         slab, seat = np.divmod(state.first_seat + j, per_slab)
@@ -160,5 +161,5 @@ def _slab_springs(
             slab[i, side, 1, design.seat_index[j, side]] = b * design.seat_slope[j, side]
             slab[i, side, 2, -2:] = 1.0, design.seat_x[j]
     m = k.size
-    test, flow = test.reshape(m, -1), flow.reshape(m, -1)
-    return _Springs(test, k.reshape(m, 1) * test + c.reshape(m, 1) * flow, slab.reshape(m, -1), k.ravel())
+    shapes, rates = test.reshape(m, -1), flow.reshape(m, -1)
+    return _Springs(shapes, k.reshape(m, 1) * shapes + c.reshape(m, 1) * rates, slab.reshape(m, -1), k.ravel())

@@ -19,9 +19,7 @@ FIGURE = ROOT / "docs" / "images" / "paper_case.png"
 
 @click.group(invoke_without_command=True)
 @click.option("--quick", is_flag=True, help="Only the cases that together take less than five minutes.")
-@click.option(
-    "--only", multiple=True, metavar="NAME", help="Only cases whose name begins so; may be repeated."
-)
+@click.option("--only", multiple=True, metavar="NAME", help="Only cases whose name begins so; may be repeated.")
 @click.option("--write", is_flag=True, help="Write the table into README.md and validation/report.")
 @click.pass_context
 def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool) -> None:
@@ -30,13 +28,9 @@ def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool
         return
     from validation.catalogue import CASES
 
-    chosen = [
-        case for case in CASES if (case.quick or not quick) and (not only or case.name.startswith(only))
-    ]
+    chosen = [case for case in CASES if (case.quick or not quick) and (not only or case.name.startswith(only))]
     if not chosen:
-        raise click.UsageError(
-            f"no case begins with {', '.join(only)}; known: {', '.join(c.name for c in CASES)}"
-        )
+        raise click.UsageError(f"no case begins with {', '.join(only)}; known: {', '.join(c.name for c in CASES)}")
     backend.start()
     console = Console()
     outcomes: list[Outcome] = []

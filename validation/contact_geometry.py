@@ -41,9 +41,7 @@ AMPLITUDES = np.arange(1.0, 8.0) * 1e-3
 
 
 def _pair(wheel: str, rail: str, settings: dict[str, float]) -> WheelRailPair:
-    return WheelRailPair(
-        load_profile(wheel, "wheel"), load_profile(rail, "rail"), ContactSettings(**settings)
-    )
+    return WheelRailPair(load_profile(wheel, "wheel"), load_profile(rail, "rail"), ContactSettings(**settings))
 
 
 def _stations() -> dict[str, Reals]:

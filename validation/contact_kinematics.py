@@ -67,10 +67,7 @@ def _virtual_work() -> tuple[float, float]:
     force, moment = 0.0, 0.0
     for q in range(3):  # y, z, roll of the wheelset
         nudge = NUDGE * np.eye(5)[q]
-        p = [
-            _penetration(_evaluate(wheelset + s * nudge, rails, channels), rails, channels)[0]
-            for s in (1, -1)
-        ]
+        p = [_penetration(_evaluate(wheelset + s * nudge, rails, channels), rails, channels)[0] for s in (1, -1)]
         exact = -(pull * (p[0] - p[1]) / (2.0 * NUDGE)).sum(axis=1)
         error = np.nanmax(np.abs(found.wheelset[:, 0, q] - exact) / total)
         force, moment = (force, max(moment, error)) if q == 2 else (max(force, error), moment)
@@ -125,9 +122,7 @@ CASES = (
     Case(
         name="rolling-along-a-shape",
         kind="verification",
-        quantity=(
-            "lateral creepage of a wheelset that follows a slope of 1e-3 of track or rail, down and across"
-        ),
+        quantity=("lateral creepage of a wheelset that follows a slope of 1e-3 of track or rail, down and across"),
         source="what rolls along a shape does not slip on it",
         reference=np.zeros(8),
         atol=1e-15,

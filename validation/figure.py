@@ -34,17 +34,12 @@ def draw(path: Path) -> None:
         axis.set_ylabel(f"{name} force [kN]")
         axis.grid(color="0.9")
         axis.spines[["top", "right"]].set_visible(False)
-    axes[0].axhline(
-        1e-3 * run.vertical[0, 0].mean(), color="0.3", linewidth=0.8, linestyle="--", label="static"
-    )
-    legend = axes[0].legend(loc="upper right", ncols=3, frameon=False)
+    axes[0].axhline(1e-3 * run.vertical[0, 0].mean(), color="0.3", linewidth=0.8, linestyle="--", label="static")
+    legend = axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False)
     for line in legend.get_lines():
         line.set_linewidth(2.0)
     axes[1].set_xlabel("distance [m]")
-    axes[1].set_xlim(0.0, float(way[-1]))
-    figure.suptitle(
-        "Forces of wheelset 1 on the rails: CRH380A, CRTS III slab track, 350 km/h, German low disturbance",
-        fontsize=10,
-    )
+    axes[1].set_xlim(0.0, round(float(way[-1]), -1))
+    axes[0].set_title("Wheelset 1 on the rails: CRH380A, CRTS III, 350 km/h", loc="left", fontsize=10)
     figure.savefig(path, dpi=160)
     plt.close(figure)

@@ -51,8 +51,7 @@ def _scatter() -> Reals:
     spectrum = load_spectrum("german_low")
     edges = np.geomspace(2 * np.pi / 120.0, 2 * np.pi, 2001)
     square = [
-        band_variances(lambda Omega, c=channel: spectrum.density(c, Omega) ** 2, edges).sum()
-        for channel in ORDER
+        band_variances(lambda Omega, c=channel: spectrum.density(c, Omega) ** 2, edges).sum() for channel in ORDER
     ]
     of_variance = np.sqrt(2 * np.pi * np.array(square) / LENGTH)
     return 4.0 * 1e3 * of_variance / (2.0 * np.array(LOW[1.0, 120.0]) * 1e-3)
@@ -62,9 +61,7 @@ CASES = (
     Case(
         name="sigma-german-low",
         kind="validation",
-        quantity=(
-            "German low: vertical, alignment, gauge [mm], cross level [mrad] in five bands of wavelength"
-        ),
+        quantity=("German low: vertical, alignment, gauge [mm], cross level [mrad] in five bands of wavelength"),
         source=INDEPENDENT,
         reference=tuple(LOW.values()),
         atol=1e-3,

@@ -73,10 +73,7 @@ CASES = (
         name="moving-load-convergence",
         kind="convergence",
         quantity="what is missing under the load with 120, 240, 480 modes [um]",
-        source=(
-            "static compliance of the modes left out: 2/l times the sum of 1/(kGA k^2) + 1/(EI k^4), of "
-            "order 1/N"
-        ),
+        source=("static compliance of the modes left out: 2/l times the sum of 1/(kGA k^2) + 1/(EI k^4), of order 1/N"),
         reference=lambda: [1e3 * _missing(modes) for modes in (120, 240, 480)],
         rtol=0.01,
         why="the foundation's share in modes beyond 120: k / (kGA k_i^2) < 1 %",

@@ -30,9 +30,7 @@ def _after_run_in(values: Reals) -> Reals:
 
 def _at_rest() -> Reals:
     """Mean lateral creep force and net lateral force of a wheel on a smooth track [kN]."""
-    run = simulate(
-        "paper", 'irregularity.spectrum="none"', "train.distance=110.0", "numerics.time_step=0.0002"
-    )
+    run = simulate("paper", 'irregularity.spectrum="none"', "train.distance=110.0", "numerics.time_step=0.0002")
     return 1e-3 * np.array([np.abs(run.creep).mean(), np.abs(run.lateral).mean()])
 
 
@@ -107,9 +105,7 @@ CASES = (
     Case(
         name="paper-real-time-factor",
         kind="information",
-        quantity=(
-            "wall time of the loop over simulated time: pre-bound launches (600 m), public ones (50 m)"
-        ),
+        quantity=("wall time of the loop over simulated time: pre-bound launches (600 m), public ones (50 m)"),
         source="-",
         reference=(np.nan, np.nan),
         why="on the machine that wrote this table; compilation and set-up apart",

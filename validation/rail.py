@@ -50,9 +50,7 @@ def _lateral_beam() -> Beam:
 def _frequencies(plane: str, modes: int) -> Reals:
     """Sorted frequencies of the window at rest [Hz]; torsion is left out of the lateral plane."""
     M, _, K = getattr(_window(modes), plane)(0.0)
-    omega2 = scipy.linalg.eigvalsh(
-        K.toarray()[: 2 * modes, : 2 * modes], M.toarray()[: 2 * modes, : 2 * modes]
-    )
+    omega2 = scipy.linalg.eigvalsh(K.toarray()[: 2 * modes, : 2 * modes], M.toarray()[: 2 * modes, : 2 * modes])
     return np.sqrt(omega2) / (2.0 * np.pi)
 
 
@@ -138,8 +136,7 @@ CASES = (
         name="rail-convective-power",
         kind="verification",
         quantity=(
-            "power of the convective terms less the flux through the window's ends, relative, random "
-            "states, 350 km/h"
+            "power of the convective terms less the flux through the window's ends, relative, random states, 350 km/h"
         ),
         source="q' C q' = -V mu [theta_t^2] at the ends for cosine fields, 0 for sine fields",
         reference=0.0,

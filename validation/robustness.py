@@ -24,9 +24,7 @@ SHORT = ("train.distance=20.0", "numerics.time_step=2e-4")
 
 def _slow(kmh: float) -> float:
     """Largest deviation of a wheel's vertical force from its mean, over the mean, in 30 m at a low speed."""
-    force = simulate(
-        "paper", f"train.speed_kmh={kmh}", "train.distance=30.0", "numerics.time_step=2e-4"
-    ).vertical
+    force = simulate("paper", f"train.speed_kmh={kmh}", "train.distance=30.0", "numerics.time_step=2e-4").vertical
     mean = force.mean(axis=0)
     return float((np.abs(force - mean) / mean).max())
 
@@ -89,9 +87,7 @@ CASES = (
         kind="convergence",
         quantity="standard deviation of the vertical force over 100 m, 144 modes at dt = 2e-4 s [kN]",
         source="60 modes, the same track",
-        reference=lambda: (
-            1e-3 * simulate("paper", "train.distance=100.0", "numerics.time_step=2e-4").vertical.std()
-        ),
+        reference=lambda: 1e-3 * simulate("paper", "train.distance=100.0", "numerics.time_step=2e-4").vertical.std(),
         rtol=0.05,
         why="60 modes are known to be 3 % of the peak from converged",
         compute=lambda: (

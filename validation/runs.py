@@ -49,9 +49,7 @@ def simulate(scenario: str, *overrides: str, public: bool = False) -> Forces:
         overrides: ``"train.speed_kmh=300"`` and the like.
         public: Public Taichi calls only.
     """
-    with run(
-        load_scenario(scenario, ['output.precision="double"', *overrides]), public_launch=public
-    ) as result:
+    with run(load_scenario(scenario, ['output.precision="double"', *overrides]), public_launch=public) as result:
         wheel, facts = result.wheel(), result.attributes
     return Forces(
         time=wheel["time"],

@@ -26,9 +26,7 @@ V, DT, SLABS, STEPS = 350.0 / 3.6, 2e-4, 10, 2916  # STEPS of DT at V are SLABS 
 
 
 def _run() -> Forces:
-    return simulate(
-        "paper", 'irregularity.spectrum="none"', "train.distance=110.0", f"numerics.time_step={DT}"
-    )
+    return simulate("paper", 'irregularity.spectrum="none"', "train.distance=110.0", f"numerics.time_step={DT}")
 
 
 def _last(values: Reals) -> Reals:
@@ -84,9 +82,7 @@ CASES = (
         source="static wheel load",
         reference=_static,
         rtol=2e-3,
-        why=(
-            "creep forces of the canted contacts shift load between wheels; seats are passed as time goes on"
-        ),
+        why=("creep forces of the canted contacts shift load between wheels; seats are passed as time goes on"),
         compute=lambda: _last(_run().vertical).mean(axis=0).ravel(),
     ),
     Case(
@@ -102,9 +98,7 @@ CASES = (
     Case(
         name="smooth-passing",
         kind="verification",
-        quantity=(
-            "share of the ripple's variance at multiples of the slab-passing frequency (seats: every ninth)"
-        ),
+        quantity=("share of the ripple's variance at multiples of the slab-passing frequency (seats: every ninth)"),
         source="a periodic track forces a periodic answer",
         reference=0.99,
         rule="at least",

@@ -59,9 +59,7 @@ def show(outcomes: Sequence[Outcome], console: Console) -> None:
 
 def markdown(outcomes: Sequence[Outcome]) -> str:
     """The same as Markdown, headed by what it was computed with."""
-    versions = ", ".join(
-        f"{name} {metadata.version(name)}" for name in ("tiengine", "taichi", "numpy", "scipy")
-    )
+    versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("tiengine", "taichi", "numpy", "scipy"))
     judged = [outcome for outcome in outcomes if outcome.verdict in ("ok", "MISS")]
     missed = [outcome.case.name for outcome in judged if outcome.verdict == "MISS"]
     lines = [

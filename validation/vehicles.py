@@ -33,9 +33,7 @@ def _held(name: str) -> Reals:
     """Frequencies [Hz] nearest to the printed ones, where pairs of the two frames are one number."""
     train = _train(name)
     free = np.setdiff1d(np.arange(train.n), train.wheelset_dof)
-    own = np.sqrt(eigh(train.K[np.ix_(free, free)], train.M[np.ix_(free, free)], eigvals_only=True)) / (
-        2.0 * np.pi
-    )
+    own = np.sqrt(eigh(train.K[np.ix_(free, free)], train.M[np.ix_(free, free)], eigvals_only=True)) / (2.0 * np.pi)
     printed = _printed(name)
     return own[np.abs(own[:, None] - printed).argmin(axis=0)]
 

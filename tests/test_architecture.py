@@ -1,0 +1,99 @@
+"""Rules of the code base that a machine can check."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+HOST, DEVICE = sorted((ROOT / "tiengine").glob("*.py")), sorted((ROOT / "kernels").glob("*.py"))
+LONGEST = 400  # lines; 300 is the aim
+
+LAYERS = [
+    {"quantity", "presets", "backend", "launch", "channels", "overrides"},
+    {"rail", "fastening", "slab", "mortar", "profile", "hertz", "kalker", "speed", "spectrum", "connector", "coach",
+     "vehicle", "assembly", "train", "contact_search", "contact_geometry", "conicity", "realisation", "given_track",
+     "irregularity", "defects"},
+    {"parts", "scenario"},
+    {"integrator", "blocks", "model"},
+    {"state", "track_static"},
+    {"stepper", "start", "setup"},
+    {"results", "writer", "recorder", "events", "stability"},
+    {"simulate"},
+    {"cli"},
+]  # fmt: skip
+"""A module imports from its own layer and those above it in this list."""
+
+
+def imported(path: Path) -> set[str]:
+    """Modules of the package that a file imports, as ``kernels.x`` or ``x``; type-checking imports apart."""
+    found: set[str] = set()
+    tree = ast.parse(path.read_text())
+    guarded = [n for n in ast.walk(tree) if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.dump(n.test)]
+    skip = {id(inner) for n in guarded for inner in ast.walk(n)}
+    for node in ast.walk(tree):
+        if id(node) in skip:
+            continue
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("tiengine"):
+            module = node.module.removeprefix("tiengine").removeprefix(".")
+            names = {a.name for a in node.names}
+            found |= {f"kernels.{name}" for name in names} if module == "kernels" else {module} if module else names
+        elif isinstance(node, ast.Import):
+            found |= {a.name.removeprefix("tiengine.") for a in node.names if a.name.startswith("tiengine.")}
+    return found
+
+
+@pytest.mark.parametrize("path", DEVICE, ids=lambda p: p.stem)
+def test_kernels_import_no_host_code(path):
+    host = {file.stem for file in HOST}
+    assert not {name.split(".")[0] for name in imported(path)} & host
+
+
+@pytest.mark.parametrize("path", HOST, ids=lambda p: p.stem)
+def test_imports_point_one_way(path):
+    if path.stem == "__init__":
+        return
+    rank = {name: i for i, layer in enumerate(LAYERS) for name in layer}
+    assert path.stem in rank, "a new module needs a place in LAYERS"
+    for name in imported(path):
+        if name in rank:
+            assert rank[name] <= rank[path.stem], f"{path.stem} imports {name}"
+
+
+@pytest.mark.parametrize("path", [*HOST, *DEVICE], ids=lambda p: p.stem)
+def test_files_fit_a_reader(path):
+    assert len(path.read_text().splitlines()) <= LONGEST
+
+
+@pytest.mark.parametrize("path", DEVICE, ids=lambda p: p.stem)
+def test_kernels_write_only_what_their_signature_says(path):
+    """A kernel stores into ``*_out``, ``motion`` or scratch that ``tiengine.state`` owns, never into constants."""
+    constants = {
+        "dims",
+        "constants",
+        "clock",
+        "table",
+        "stiffness",
+        "mass",
+        "G",
+        "scale",
+        "shape",
+        "index",
+        "band",
+        "tick",
+    }
+    for function in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(function, ast.FunctionDef):
+            continue
+        arguments = {a.arg for a in function.args.args}
+        for node in ast.walk(function):
+            targets = (
+                node.targets
+                if isinstance(node, ast.Assign)
+                else [node.target]
+                if isinstance(node, ast.AugAssign)
+                else []
+            )
+            for target in targets:
+                if isinstance(target, ast.Subscript) and isinstance(target.value, ast.Name):
+                    assert target.value.id not in constants & arguments, f"{function.name} writes {target.value.id}"
