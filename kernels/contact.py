@@ -50,7 +50,7 @@ def wheelset_coordinates(b: int, wheelset: int, dims: Array, dof: Array, row: in
 
 @ti.func
 def rail_coordinates(b: int, wheelset: int, rail: int, dims: Array, shape: Array, motion: Array, rail_out: Array):
-    """Rail under a wheel, into ``rail_out[b, wheelset, rail]``: w, v, theta_x, their slopes, their rates at constant s."""
+    """Rail under a wheel, into ``rail_out[b, wheelset, rail]``: w, v, theta_x, slopes, rates at constant s."""
     n = dims[at.MODES]
     w = (b * 2 + rail) * 2 * n
     v = dims[at.LATERAL] + (b * 2 + rail) * 3 * n

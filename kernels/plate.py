@@ -65,9 +65,7 @@ def acm_shape(i, xi, eta, a, b):
     if i % 3 == 2:
         R = sy * b * slope_shape(t, s)
         P = ti.Vector([R[0], R[2], R[1], R[4], R[3], R[5]])
-    return ti.Vector(
-        [P[0], sx * P[1] / a, sy * P[2] / b, P[3] / (a * a), P[4] / (b * b), sx * sy * P[5] / (a * b)]
-    )
+    return ti.Vector([P[0], sx * P[1] / a, sy * P[2] / b, P[3] / (a * a), P[4] / (b * b), sx * sy * P[5] / (a * b)])
 
 
 @ti.kernel

@@ -76,6 +76,24 @@ def add_vehicle_forces(b: int, V_rate: float, dims: Array, load: Array, dof: Arr
 
 
 @ti.func
+def add_mortar_forces(
+    b: int, dims: Array, design: Array, index: Array, shape: Array, weight: Array, factor: Array, rest: Array,
+    lateral_K: Array, lateral_C: Array, numbers: Array, motion: Array, pressure_out: Array,
+):  # fmt: skip
+    """Force of every slab's bed that is not in the implicit part (none in mode 0), and its extreme pressures."""
+    n = dims[at.SLAB_DOFS]
+    explicit, no_tension = ti.cast(numbers[2], ti.i32), ti.cast(numbers[3], ti.i32)
+    for slot in range(dims[at.SLOTS]):
+        base = dims[at.SLABS] + (b * dims[at.SLOTS] + slot) * n
+        pressure = mortar.bed_force_and_pressure(
+            design[b, slot], index, shape, weight, factor, rest, lateral_K, lateral_C, numbers[0], numbers[1],
+            explicit, no_tension, base, n, motion, at.U, at.V, at.F,
+        )  # fmt: skip
+        for m in ti.static(range(2)):
+            pressure_out[b, slot, m] = pressure[m]
+
+
+@ti.func
 def accept(b: int, dims: Array, motion: Array):
     """Take the solution without contact as the iterate's acceleration."""
     for part in ti.static(range(4)):
@@ -155,8 +173,8 @@ def keep_forces(b: int, dims: Array, force: Array, rail: Array, force_before: Ar
 
 @ti.func
 def record(
-    b: int, tick: Array, dims: Array, contact: Array, force: Array, rail_force: Array, motion: Array, wheel_record: Array,
-    body_record: Array,
+    b: int, tick: Array, dims: Array, contact: Array, force: Array, rail_force: Array, motion: Array, pressure: Array,
+    wheel_record: Array, body_record: Array, mortar_record: Array,
 ):  # fmt: skip
     """Copy the wheels' output and the bodies' motion into the rows of the buffers that this step is to fill."""
     if tick[at.WHEEL_RECORD] >= 0:
@@ -167,6 +185,9 @@ def record(
         for i in range(5 * dims[at.BODIES]):
             for row in ti.static(range(3)):
                 body_record[b, tick[at.BODY_RECORD], row, i] = motion[row, base + i]
+        for slot in range(dims[at.SLOTS]):
+            for m in range(2):
+                mortar_record[b, tick[at.BODY_RECORD], slot, m] = pressure[b, slot, m]
 
 
 @ti.kernel
@@ -218,7 +239,7 @@ def explicit_forces(
 ):
     """First half of a pass; see the module. Array shapes as in ``tiengine.model`` and the stages' own kernels.
 
-    ``pressure_out`` is written only where the mortar is evaluated (mortar mode 1 or 2).
+    ``pressure_out`` is written where the mortar is evaluated: in mortar modes 1 and 2, and when bodies are recorded.
     """
     ti.loop_config(serialize=not parallel)
     for z in range(dims[at.TRAINS] * ti.static(512 if parallel else 1)):
@@ -240,16 +261,11 @@ def explicit_forces(
                 b, step, dims, constants, clock, gather_table, scatter_table, scale, seat_index, seat_shape, seat_x,
                 motion, modal, seat_motion, seat_force_out,
             )  # fmt: skip
-            if dims[at.MORTAR_MODE] > 0:
-                for slot in range(dims[at.SLOTS]):
-                    pressure = mortar.bed_force_and_pressure(
-                        design[b, slot], bed_index, bed_shape, bed_weight, bed_factor, bed_rest, bed_lateral_K,
-                        bed_lateral_C, bed_numbers[0], bed_numbers[1], ti.cast(bed_numbers[2], ti.i32), ti.cast(bed_numbers[3], ti.i32),
-                        dims[at.SLABS] + (b * dims[at.SLOTS] + slot) * dims[at.SLAB_DOFS], dims[at.SLAB_DOFS], motion,
-                        at.U, at.V, at.F,
-                    )  # fmt: skip
-                    pressure_out[b, slot, 0] = pressure[0]
-                    pressure_out[b, slot, 1] = pressure[1]
+            if dims[at.MORTAR_MODE] > 0 or (tick[at.LAST_PASS] == 1 and tick[at.BODY_RECORD] >= 0):
+                add_mortar_forces(
+                    b, dims, design, bed_index, bed_shape, bed_weight, bed_factor, bed_rest, bed_lateral_K,
+                    bed_lateral_C, bed_numbers, motion, pressure_out,
+                )  # fmt: skip
             base = dims[at.VEHICLES] + b * dims[at.VEHICLE_DOFS]
             suspension.add_suspension_forces(
                 base, element_index, element_row, element_kind, element_linear, element_table, motion, at.U, at.V, at.F
@@ -285,8 +301,10 @@ def contact_and_update(
     wheelset_before: Reals3,
     rail_before: Reals4,
     iterations_out: Ints2,
+    pressure: Reals3,
     wheel_record: Reals5,
     body_record: Reals4,
+    mortar_record: Reals4,
 ):
     """Second half of a pass; see the module. Array shapes as in ``tiengine.model``."""
     ti.loop_config(serialize=not parallel)
@@ -317,4 +335,7 @@ def contact_and_update(
             )
             update(b, dims, constants, motion)
             if tick[at.LAST_PASS] == 1:
-                record(b, tick, dims, contact, force, rail_force, motion, wheel_record, body_record)
+                record(
+                    b, tick, dims, contact, force, rail_force, motion, pressure, wheel_record, body_record,
+                    mortar_record,
+                )  # fmt: skip

@@ -19,7 +19,6 @@ from tiengine.kernels.types import Array, Template
 )
 
 
-
 @ti.func
 def catmull_rom(f: float):
     """Weights of the four taps around a cell at fraction f in [0, 1]: C1 in the argument."""
@@ -124,8 +123,26 @@ def contact_state(
     xi_y = (across * c - sigma * down * s) / V
     xi_s = (-sigma * (V / r0) * ti.sin(gamma + alpha) + dx[4] * c) / V
     return ti.Vector(
-        [p * ti.cos(gamma), xi_x, xi_y, xi_s, s, c, s_w, s_r, r_c]
-        + [g[at.HERTZ], g[at.C11], g[at.C22], g[at.C23], g[at.C33], u, z_irr, y_irr, w]
+        [
+            p * ti.cos(gamma),
+            xi_x,
+            xi_y,
+            xi_s,
+            s,
+            c,
+            s_w,
+            s_r,
+            r_c,
+            g[at.HERTZ],
+            g[at.C11],
+            g[at.C22],
+            g[at.C23],
+            g[at.C33],
+            u,
+            z_irr,
+            y_irr,
+            w,
+        ]
     )
 
 
@@ -188,7 +205,7 @@ def placing(state: Template):
 def force_directions(sigma: float, r0: float, b0: float, h_r: float, place: Template):
     """Generalised forces of unit (N, Fx, Fy, Mz): on the wheelset (5, 4) and on the rail's w, v, theta_x (3, 4).
 
-    The arms are those of the actual contact point: (sigma (b0 + s_w), r_c) on the wheelset, (sigma s_r, -h_c) on the rail.
+    The arms are those of the contact point: (sigma (b0 + s_w), r_c) on the wheelset, (sigma s_r, -h_c) on the rail.
     """
     s, c = place[0], place[1]
     arm, r, s_r = b0 + place[2], place[4], place[3]

@@ -41,7 +41,7 @@ def assert_refused(folder: Path, arguments: tuple[str, ...], *words: str) -> Non
         ("train.speed_kmh=0", ("train.speed_kmh = 0", "must be greater than 0")),
         ("numerics.window=10", ("numerics.window = 10", "shorter than the train")),
         ("numerics.time_step=0.5", ("numerics.time_step = 0.5", "must be 'auto' or a number between")),
-        ("numerics.time_step=9e-4", ("wavelength_min = 1", "8 V dt")),
+        ("irregularity.wavelength_min=0.05", ("wavelength_min = 0.05", "8 V dt")),
     ],
 )
 def test_a_wrong_value(tmp_path, setting, words):
@@ -51,9 +51,9 @@ def test_a_wrong_value(tmp_path, setting, words):
 
 def test_an_unstable_step(tmp_path):
     """What only the trial of the step itself can tell."""
-    settings = ("numerics.time_step=4e-4", "numerics.passes=1", "numerics.modes_per_metre=4")
+    settings = ("numerics.time_step=1e-3", "numerics.modes_per_metre=8")
     arguments = [word for setting in settings for word in ("--set", setting)]
-    assert_refused(tmp_path, ("default", *arguments), "numerics.time_step = 0.0004", "unstable", "choose")
+    assert_refused(tmp_path, ("default", *arguments), "numerics.time_step = 0.001", "unstable", "choose")
 
 
 def test_output_that_cannot_be_written(tmp_path):

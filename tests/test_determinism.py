@@ -58,7 +58,7 @@ def in_a_process(threads: int, optimised: bool, steps: int) -> dict[str, Any]:
 
 
 def test_same_bits_in_other_processes_and_for_two_threads():
-    """One and two Taichi threads, each in a process of its own."""
+    """One and two Taichi threads, each in a process of its own, the parallel loop in both."""
     assert in_a_process(1, True, 200)["digest"] == in_a_process(2, True, 200)["digest"]
 
 

@@ -34,7 +34,7 @@ def timoshenko(EI: float, S: float, m: float, rotary: float, k: NDArray[np.float
 
 
 def frequencies(K: NDArray[np.float64], M: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Circular frequencies, ascending; the lower half from M against K, since squares are known to 1e-16 of the largest."""
+    """Circular frequencies, ascending; the lower half from M against K: squares are known to 1e-16 of the largest."""
     high = np.sqrt(la.eigh(K, M, eigvals_only=True))
     low = 1.0 / np.sqrt(la.eigh(M, K, eigvals_only=True)[::-1])
     half = len(high) // 2
@@ -117,9 +117,7 @@ def test_convective_matrices_are_lagrange_plus_flow() -> None:
     """Each field: Galerkin on the strong form = Lagrange's equation with the flow force through the ends."""
     window, V = RailWindow(chn60(), 7.3, 13), V350
     s, weight = quadrature(7.3, 13)
-    for mu, cosine, (C, K) in zip(
-        window.rail.densities, COSINE, field_blocks(window, V, V_RATE), strict=True
-    ):
+    for mu, cosine, (C, K) in zip(window.rail.densities, COSINE, field_blocks(window, V, V_RATE), strict=True):
         W, slope, _ = trial(window, s, cosine)
         cross = np.einsum("q,qi,qj->ij", weight, W, slope)
         straight = np.einsum("q,qi,qj->ij", weight, slope, slope)

@@ -54,9 +54,7 @@ def balance(model: Model, state: State, X: float, V: float) -> NDArray[np.float6
     motion[at.U_PREDICTED], motion[at.V_PREDICTED] = motion[at.U], motion[at.V]
     train = model.given.train
     clock = positions(model, np.array([X]), np.array([V]), np.zeros(1)).clock
-    rail.rail_forces(
-        V, 0.0, model.dims, model.constants, model.stiffness, model.mass, model.G, motion
-    )
+    rail.rail_forces(V, 0.0, model.dims, model.constants, model.stiffness, model.mass, model.G, motion)
     linear.linear_forces(V, model.dims, state.design, model.band, train.K, train.C, train.C_speed, motion)
     motion[at.F] = motion[at.LINEAR]
     fastening.fastening_forces(
@@ -72,9 +70,7 @@ DEFECTS = (
 )
 
 
-@pytest.mark.parametrize(
-    ("X", "V", "overrides"), [(101.35, V350, ()), (0.0, V350, DEFECTS), (7.77, 0.0, DEFECTS)]
-)
+@pytest.mark.parametrize(("X", "V", "overrides"), [(101.35, V350, ()), (0.0, V350, DEFECTS), (7.77, 0.0, DEFECTS)])
 def test_kernels_balance_the_static_solution(X: float, V: float, overrides: tuple[str, ...]) -> None:
     """Loads on both rails: the kernels find host-made displacements in balance, defects and convection included."""
     model = paper_model(*overrides, V=V350)

@@ -1,4 +1,4 @@
-"""Contact kinematics and law: virtual work, rolling without slip, action and reaction, mirror symmetry, creep forces."""
+"""Contact kinematics and law: virtual work, rolling without slip, action and reaction, symmetry, creep forces."""
 
 from __future__ import annotations
 
@@ -224,7 +224,7 @@ def test_following_a_lateral_shape(model: Model) -> None:
 def test_following_a_twisted_rail(model: Model) -> None:
     """Torsion of each rail along the ground; one wheel at a time follows with roll, shift, height and yaw."""
     rate = 1e-3  # rad/m
-    r0, b0 = model.wheel[0, :2]
+    r0, _b0 = model.wheel[0, :2]
     h_r = model.constants[at.ARM_HEAD]
     x = Wheelsets(len(SHIFTS))
     x.u[:, 0, Y] = SHIFTS
@@ -335,9 +335,7 @@ def test_mirror_symmetry(model: Model) -> None:
         there.local[:, 0], here.local[:, 0, ::-1] * [1.0, 1.0, -1.0, -1.0], atol=1e-9 * size.max()
     )
     np.testing.assert_allclose(there.wheelset[:, 0], here.wheelset[:, 0] * flip, atol=1e-9 * size.max())
-    np.testing.assert_allclose(
-        there.rail[:, 0], here.rail[:, 0, ::-1] * [1.0, -1.0, -1.0], atol=1e-9 * size.max()
-    )
+    np.testing.assert_allclose(there.rail[:, 0], here.rail[:, 0, ::-1] * [1.0, -1.0, -1.0], atol=1e-9 * size.max())
 
 
 def test_lifted_wheel_carries_nothing(model: Model) -> None:
@@ -352,7 +350,7 @@ def test_lifted_wheel_carries_nothing(model: Model) -> None:
     assert np.isfinite(found.contact).all()
 
 
-# A 1:20 cone on a rail head of R = 300 mm at r = 0.43 m, 70 kN: FACTS 7.1; Kalker's table at nu = 0.25 beside a/b = 1.25.
+# A 1:20 cone, r = 0.43 m, on a rail head of R = 300 mm: FACTS 7.1; Kalker's table at nu = 0.25 beside a/b = 1.25.
 E, NU, SHEAR = 2.059e11, 0.25, 2.059e11 / 2.5
 C_KALKER = (4.41, 4.02, 1.77, 0.97)
 

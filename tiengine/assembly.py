@@ -112,9 +112,7 @@ class Assembly:
             row = B[_AXES[stop.direction]]
             self._add_element(self.K, prefix + stop.name, columns, row, _FORCE_OF_ELONGATION, stop.table)
 
-    def _elongation(
-        self, joint: Joint, index: dict[str, int]
-    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def _elongation(self, joint: Joint, index: dict[str, int]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Columns of both bodies (12,) and the six elongations by them (6, 12)."""
         a, b = index[joint.a], index[joint.b]
         columns = np.concatenate([6 * a + np.arange(6), 6 * b + np.arange(6)])
@@ -159,9 +157,7 @@ def _levelled(spring: Spring) -> Spring:
     return spring.model_copy(update=ends)
 
 
-def _add(
-    matrix: NDArray[np.float64], columns: NDArray[np.intp], row: NDArray[np.float64], value: float
-) -> None:
+def _add(matrix: NDArray[np.float64], columns: NDArray[np.intp], row: NDArray[np.float64], value: float) -> None:
     """Add value row' row at the columns."""
     matrix[np.ix_(columns, columns)] += value * np.outer(row, row)
 
@@ -178,9 +174,7 @@ def longitudinal_push(full: Assembly) -> NDArray[np.float64]:
     Raises:
         InputError: No longitudinal spring carries a body's inertia to the wheelsets.
     """
-    sprung = np.array(
-        [6 * i for i, placed in enumerate(full.bodies) if not placed.body.wheelset], dtype=np.intp
-    )
+    sprung = np.array([6 * i for i, placed in enumerate(full.bodies) if not placed.body.wheelset], dtype=np.intp)
     mass = np.diag(full.M)[sprung]
     K_xx = full.K_push[np.ix_(sprung, sprung)]
     x = np.linalg.lstsq(K_xx, mass, rcond=None)[0] if len(sprung) else mass

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["BODY", "DOFS", "GROUPS", "IRREGULARITY", "SIDES", "WHEEL", "Channel"]
+__all__ = ["BODY", "DOFS", "GROUPS", "IRREGULARITY", "MORTAR", "SIDES", "WHEEL", "Channel"]
 
 
 class Channel(NamedTuple):
@@ -59,4 +59,11 @@ IRREGULARITY = {
 }
 """Dimensions (time, wheelset, side)."""
 
-GROUPS = {"wheel": WHEEL, "body": BODY, "irregularity": IRREGULARITY}
+MORTAR = {
+    "slab": Channel("1", "index of the slab in each slot of the window, from chainage 0"),
+    "largest_pressure": Channel("Pa", "largest pressure of the mortar under the slab, dead weight included"),
+    "smallest_pressure": Channel("Pa", "smallest pressure of the mortar under the slab, dead weight included"),
+}
+"""Dimensions (time, slot); the slabs in the window, each in the slot of its index modulo the number of slots."""
+
+GROUPS = {"wheel": WHEEL, "body": BODY, "irregularity": IRREGULARITY, "mortar": MORTAR}

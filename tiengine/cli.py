@@ -1,7 +1,7 @@
 """Command line: ``tiengine run``, ``tiengine list``, ``tiengine info``.
 
-Bad input ends with one line on stderr and exit status 2. Taichi is imported only by ``run``, so that the
-others answer at once.
+Bad input ends with one line on stderr and exit status 2, a run that fails on its way with status 1. Taichi is imported
+only by ``run``, so that the others answer at once.
 """
 
 from __future__ import annotations
@@ -62,12 +62,8 @@ def main() -> None:
 
 @main.command()
 @click.argument("scenario")
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Result file; default: the scenario's name."
-)
-@click.option(
-    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key: train.speed_kmh=300"
-)
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Result file; default: the scenario's name.")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key: train.speed_kmh=300")
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option("--force", is_flag=True, help="Replace an existing result file.")
 def run(scenario: str, output: Path | None, settings: Sequence[str], quiet: bool, force: bool) -> None:
@@ -82,10 +78,15 @@ def run(scenario: str, output: Path | None, settings: Sequence[str], quiet: bool
     check_output(path, force)
 
     from tiengine import simulate
+    from tiengine.events import RunFailedError
 
     console = Console(stderr=True, quiet=quiet)
-    with _ended_by_sigterm(), _progress(console, resolved.name) as progress:
-        result = simulate.run(resolved, path, force=force, progress=progress)
+    try:
+        with _ended_by_sigterm(), _progress(console, resolved.name) as progress:
+            result = simulate.run(resolved, path, force=force, progress=progress)
+    except RunFailedError as failure:
+        click.echo(f"run failed: {failure}; {path} holds what was computed until then", err=True)
+        raise SystemExit(1) from None
     with result:
         if not quiet:
             _print_rows([*_summary(result.attributes), ("result", str(path))])
@@ -150,9 +151,7 @@ def _print_rows(rows: Sequence[tuple[str, str]]) -> None:
 
 def _summary(attributes: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Size, step, speed and wall times of a run."""
-    return [
-        (words, form.format(attributes[key])) for key, (words, form) in SUMMARY.items() if key in attributes
-    ]
+    return [(words, form.format(attributes[key])) for key, (words, form) in SUMMARY.items() if key in attributes]
 
 
 @contextmanager
@@ -166,19 +165,24 @@ def _progress(console: Console, name: str) -> Iterator[Callable[[float, float], 
         TimeRemainingColumn(),
         TextColumn("RTF {task.fields[factor]:.2f}"),
     )
-    with Progress(*columns, console=console, transient=not console.is_terminal) as bar:
-        task = bar.add_task(name, total=0.0, factor=0.0, start=False)
-        clock: list[float] = []  # the time of the first call: set-up is not part of the factor
+    bar = Progress(*columns, console=console, transient=not console.is_terminal)
+    task = bar.add_task(name, total=0.0, factor=0.0, start=False)
+    clock: list[float] = []  # the time of the first call: set-up is not part of the factor
 
-        def update(simulated_time: float, end_time: float) -> None:
-            if not clock:
-                clock.extend((time.perf_counter(), simulated_time))
-                bar.start_task(task)
-            elapsed = time.perf_counter() - clock[0]
-            factor = elapsed / max(simulated_time - clock[1], 1e-9)
-            bar.update(task, completed=simulated_time, total=end_time, factor=factor)
+    def update(simulated_time: float, end_time: float) -> None:
+        if not clock:
+            clock.extend((time.perf_counter(), simulated_time))
+            bar.start()  # not before: a run refused at set-up leaves one line, its error
+            bar.start_task(task)
+        elapsed = time.perf_counter() - clock[0]
+        factor = elapsed / max(simulated_time - clock[1], 1e-9)
+        bar.update(task, completed=simulated_time, total=end_time, factor=factor)
 
+    try:
         yield update
+    finally:
+        if clock:
+            bar.stop()
 
 
 @contextmanager

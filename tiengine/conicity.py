@@ -61,9 +61,7 @@ def wheelset_position(pair: WheelRailPair, y: ArrayLike) -> WheelsetPosition:
         low[active] = np.where(error < 0.0, phi, low[active])
         high[active] = np.where(error < 0.0, high[active], phi)
         newton = phi - error / slope
-        inside = (newton >= low[active]) & (
-            newton <= high[active]
-        )  # else: across a contact jump, back and forth
+        inside = (newton >= low[active]) & (newton <= high[active])  # else: across a contact jump, back and forth
         roll[active] = np.where(inside, newton, 0.5 * (low[active] + high[active]))
         active = active[np.abs(roll[active] - phi) > 1e-12]
         if active.size == 0:

@@ -69,9 +69,7 @@ class ContactSettings(Params):
             axis: ``"u"`` [m] or ``"alpha"`` [rad].
         """
         low, high, step = (
-            (self.u_min, self.u_max, self.du)
-            if axis == "u"
-            else (-self.alpha_max, self.alpha_max, self.dalpha)
+            (self.u_min, self.u_max, self.du) if axis == "u" else (-self.alpha_max, self.alpha_max, self.dalpha)
         )
         inside = 1e-9  # a range that is a multiple of the step up to rounding gets no further node
         return step * np.arange(np.floor(low / step + inside) - 1, np.ceil(high / step - inside) + 2)
@@ -150,9 +148,7 @@ class WheelRailPair:
         """Refuse a rail in the wheel's place."""
         for place, profile in (("wheel", self.wheel), ("rail", self.rail)):
             if profile.kind != place:
-                raise InputError(
-                    f"profile {profile.name!r} is that of a {profile.kind}; a {place} profile expected"
-                )
+                raise InputError(f"profile {profile.name!r} is that of a {profile.kind}; a {place} profile expected")
 
     @cached_property
     def canted_rail(self) -> Profile:
@@ -192,9 +188,7 @@ def build_contact_table(wheel: Profile, rail: Profile, settings: ContactSettings
     r_c = settings.wheel_radius + dz_w
     creep = _creep_columns(tan_gamma, r_c, B, settings)
     origin = np.argmin(np.abs(u)), np.argmin(np.abs(alpha))
-    values = np.concatenate(
-        [np.stack([gap - gap[origin], s_w, s_r, r_c, tan_gamma], axis=-1), creep], axis=-1
-    )
+    values = np.concatenate([np.stack([gap - gap[origin], s_w, s_r, r_c, tan_gamma], axis=-1), creep], axis=-1)
     return ContactTable(
         u_min=float(u[0]),
         du=settings.du,
@@ -217,9 +211,7 @@ def _smoothed_geometry(pair: WheelRailPair, u: Reals, alpha: Reals) -> Reals:
     reach = int(np.ceil(GAUSSIAN_REACH * sigma / step))
     fine = u[0] + step * np.arange(-reach, (u.size - 1) * finer + reach + 1)
     found = pair.contacts(fine[:, None], alpha[None, :])
-    flat = Contacts(
-        *(part.ravel() for part in (found.gap, found.s_w, found.s_r, found.dz_w, found.tan_gamma))
-    )
+    flat = Contacts(*(part.ravel() for part in (found.gap, found.s_w, found.s_r, found.dz_w, found.tan_gamma)))
     B = transverse_curvature(pair.wheel, pair.canted_rail, flat, pair.settings.curvature_span)
     B = np.maximum(B, SMALLEST_CURVATURE).reshape(found.gap.shape)
     raw = np.stack([found.gap, found.s_w, found.s_r, found.dz_w, found.tan_gamma, B])

@@ -29,9 +29,7 @@ class FailedFastenings(Params):
 
     rail: Literal["left", "right", "both"] = "both"
     seats: tuple[SeatIndex, SeatIndex]
-    factor: Annotated[
-        float, Q("-", "0 failed, below 1 degraded; scales stiffness and damping", ge=0, le=10)
-    ] = 0.0
+    factor: Annotated[float, Q("-", "0 failed, below 1 degraded; scales stiffness and damping", ge=0, le=10)] = 0.0
 
 
 class MortarDefect(Params):
@@ -99,9 +97,7 @@ def check_defects(
     for i, void in enumerate(voids):
         where = f"track.mortar_voids[{i}]"
         if void.slab > last_slab:
-            raise InputError(
-                f"{where}.slab = {void.slab}: must be between 0 and {last_slab}, the last of this run"
-            )
+            raise InputError(f"{where}.slab = {void.slab}: must be between 0 and {last_slab}, the last of this run")
         _check_span(f"{where}.x", void.x, 0.0, slab.length, "the slab's length")
         _check_span(f"{where}.y", void.y, -slab.width / 2, slab.width / 2, "the slab's width")
     for index in {void.slab for void in voids}:  # refuses voids that overlap

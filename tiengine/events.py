@@ -14,12 +14,12 @@ from tiengine.stepper import Chunk
 if TYPE_CHECKING:
     from tiengine.recorder import Recorder
 
-__all__ = ["RunFailed", "check_chunk"]
+__all__ = ["RunFailedError", "check_chunk"]
 
 SIDES = ("left", "right")
 
 
-class RunFailed(RuntimeError):
+class RunFailedError(RuntimeError):
     """A run that ended early: the message says where, when and why."""
 
 

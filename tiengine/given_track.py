@@ -50,9 +50,7 @@ def read_series(path: str | Path) -> Reals:
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise InputError(
-            f"irregularity.file = {str(path)!r}: cannot be read ({error.strerror or error})"
-        ) from None
+        raise InputError(f"irregularity.file = {str(path)!r}: cannot be read ({error.strerror or error})") from None
     except UnicodeDecodeError:
         raise InputError(f"irregularity.file = {str(path)!r}: not a UTF-8 text file") from None
     lines = [
@@ -90,9 +88,7 @@ def _header(path: str | Path, number: int, names: list[str]) -> list[str]:
 def _row(path: str | Path, number: int, cells: list[str], header: list[str]) -> list[float]:
     """The numbers of a line, checked."""
     if len(cells) != len(header):
-        raise InputError(
-            f"{path}, line {number}: {len(cells)} values; the header names {len(header)} columns"
-        )
+        raise InputError(f"{path}, line {number}: {len(cells)} values; the header names {len(header)} columns")
     values = []
     for name, cell in zip(header, cells, strict=True):
         try:

@@ -65,16 +65,14 @@ class IrregularityParams(Params):
     spectrum: str = "german_low"
     seed: Annotated[int, Q("-", "names the realisation", ge=0, le=2**63 - 1)] = 1
     wavelength_min: Annotated[float, Q("m", "shortest wave of the spectrum", gt=0, le=1e4)] = 1.0
-    wavelength_max: Annotated[
-        float, Q("m", "longest wave of the spectrum", gt=0, le=1e4, validate_default=True)
-    ] = 120.0
+    wavelength_max: Annotated[float, Q("m", "longest wave of the spectrum", gt=0, le=1e4, validate_default=True)] = (
+        120.0
+    )
     two_sided: bool = False
     scale: Annotated[float, Q("-", "factor on all amplitudes", ge=0)] = 1.0
     percentile: Annotated[float | None, Q("-", "of the Chinese spectrum; 0.632: mean", gt=0, lt=1)] = None
     short_wave: bool = False
-    short_wave_min: Annotated[
-        float, Q("m", "shortest wave of the rail roughness", gt=0, validate_default=True)
-    ] = 0.08
+    short_wave_min: Annotated[float, Q("m", "shortest wave of the rail roughness", gt=0, validate_default=True)] = 0.08
     taper: Annotated[float, Q("m", "length over which the irregularity begins", gt=0)] = 30.0
     file: str | None = None
     cross_level_rolls_rails: bool = True
@@ -94,9 +92,7 @@ class IrregularityParams(Params):
         if wavelength_max <= shortest:
             raise ValueError(f"must be > wavelength_min = {shortest:g}")
         if shortest and wavelength_max > _MOST_BANDWIDTH * shortest:
-            raise ValueError(
-                f"must be <= {_MOST_BANDWIDTH:g} wavelength_min = {_MOST_BANDWIDTH * shortest:g}"
-            )
+            raise ValueError(f"must be <= {_MOST_BANDWIDTH:g} wavelength_min = {_MOST_BANDWIDTH * shortest:g}")
         return wavelength_max
 
     @field_validator("percentile")
@@ -215,8 +211,7 @@ class Irregularity:
         least = 8.0 * speed * dt
         if self.shortest_wavelength < least:
             raise InputError(
-                f"irregularity: shortest wavelength = {self.shortest_wavelength:g} m: "
-                f"must be >= 8 V dt = {least:.4g} m"
+                f"irregularity: shortest wavelength = {self.shortest_wavelength:g} m: must be >= 8 V dt = {least:.4g} m"
             )
 
 

@@ -117,9 +117,7 @@ def _check(void: MortarVoid, length: float, width: float, others: Sequence[Morta
         raise InputError(f"{name}: x_to = {void.x_to:g}: must be <= the slab's length, {length:g} m")
     for key, y in (("y_from", void.y_from), ("y_to", void.y_to)):
         if abs(y) > width / 2.0 + 1e-9:
-            raise InputError(
-                f"{name}: {key} = {y:g}: must be within half the slab's width, {width / 2.0:g} m"
-            )
+            raise InputError(f"{name}: {key} = {y:g}: must be within half the slab's width, {width / 2.0:g} m")
     for other in others:
         overlap_x = min(void.x_to, other.x_to) - max(void.x_from, other.x_from)
         overlap_y = min(void.y_to, other.y_to) - max(void.y_from, other.y_from)

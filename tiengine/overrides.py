@@ -77,7 +77,5 @@ def _replaced(node: Any, path: list[str], value: Any, key: str) -> Any:
     if isinstance(node, tuple):
         if not head.isdecimal() or int(head) >= len(node):
             raise InputError(f"--set {key}: {head!r} must be an index between 0 and {len(node) - 1}")
-        return tuple(
-            _replaced(item, rest, value, key) if i == int(head) else item for i, item in enumerate(node)
-        )
+        return tuple(_replaced(item, rest, value, key) if i == int(head) else item for i, item in enumerate(node))
     raise InputError(f"--set {key}: {head!r} lies below a value that is not a table ({node!r})")

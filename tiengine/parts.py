@@ -215,9 +215,7 @@ def _profile(table: dict[str, Any], where: str, kind: Literal["wheel", "rail"]) 
         points = np.array([[float(y), float(z)] for y, z in rows]).reshape(-1, 2) * 1e-3
     except ValueError:
         raise InputError(f"{where}: every line of its points must hold two numbers, y and z in mm") from None
-    return Profile(
-        given.name, kind, points[:, 0].copy(), points[:, 1].copy(), given.has_cant, given.smoothing
-    )
+    return Profile(given.name, kind, points[:, 0].copy(), points[:, 1].copy(), given.has_cant, given.smoothing)
 
 
 def _centres(vehicles: list[Vehicle], train: Train) -> NDArray[np.float64]:
@@ -231,9 +229,7 @@ def _centres(vehicles: list[Vehicle], train: Train) -> NDArray[np.float64]:
     else:
         gaps = [pitch] * couplings
     if len(gaps) != couplings:
-        raise InputError(
-            f"train.coupler_pitch = {list(gaps)}: must be one number or {couplings}, one a coupling"
-        )
+        raise InputError(f"train.coupler_pitch = {list(gaps)}: must be one number or {couplings}, one a coupling")
     centres = 0.0 - np.concatenate([[0.0], np.cumsum(gaps)])
     for i in range(couplings):
         least = vehicles[i + 1].axle_positions[0] - vehicles[i].axle_positions[-1]

@@ -57,9 +57,7 @@ def preset_names(kind: str) -> list[str]:
     return sorted(file.stem for file in folder.glob("*") if file.suffix in suffixes)
 
 
-def find_preset(
-    kind: str, name_or_path: str, suffix: str = "", folder: Path | None = None, called: str = ""
-) -> Path:
+def find_preset(kind: str, name_or_path: str, suffix: str = "", folder: Path | None = None, called: str = "") -> Path:
     """File of a preset of the library or of the user.
 
     A text with a slash or the kind's suffix is a path, anything else a name of the library.
@@ -89,16 +87,12 @@ def find_preset(
         raise InputError(f"{called} = {name_or_path!r}: no such file ({path})")
     if library.is_file():
         return library
-    raise InputError(
-        f"{called} = {name_or_path!r}: no such preset{nearest(name_or_path, preset_names(kind))}"
-    )
+    raise InputError(f"{called} = {name_or_path!r}: no such preset{nearest(name_or_path, preset_names(kind))}")
 
 
 def _is_path(text: str, suffix: str) -> bool:
     """Whether a text means a file rather than a preset (names hold neither slashes nor known suffixes)."""
-    return (
-        "/" in text or "\\" in text or Path(text).suffix.lower() in {suffix, ".toml", ".csv", ".txt", ".dat"}
-    )
+    return "/" in text or "\\" in text or Path(text).suffix.lower() in {suffix, ".toml", ".csv", ".txt", ".dat"}
 
 
 def nearest(name: str, known: list[str] | tuple[str, ...]) -> str:

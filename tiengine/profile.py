@@ -66,14 +66,10 @@ class Profile:
         """Refuse points that do not describe a curve z(y)."""
         where = f"{self.kind} profile {self.name!r}"
         if self.y.shape != self.z.shape or self.y.ndim != 1 or self.y.size < FEWEST_POINTS:
-            raise InputError(
-                f"{where}: y {self.y.shape}, z {self.z.shape}; at least {FEWEST_POINTS} pairs expected"
-            )
+            raise InputError(f"{where}: y {self.y.shape}, z {self.z.shape}; at least {FEWEST_POINTS} pairs expected")
         if not (np.isfinite(self.y).all() and np.isfinite(self.z).all()):
             bad = int(np.flatnonzero(~(np.isfinite(self.y) & np.isfinite(self.z)))[0])
-            raise InputError(
-                f"{where}: point {bad + 1} is ({self.y[bad]}, {self.z[bad]}); finite numbers expected"
-            )
+            raise InputError(f"{where}: point {bad + 1} is ({self.y[bad]}, {self.z[bad]}); finite numbers expected")
         if (np.diff(self.y) <= 0.0).any():
             bad = int(np.flatnonzero(np.diff(self.y) <= 0.0)[0])
             raise InputError(
@@ -121,9 +117,7 @@ class Profile:
         below = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
         start = np.stack([y, self.height(y)], axis=1)
         t = np.interp(y, self.height.x, self.path.x) + eta
-        for _ in range(
-            6
-        ):  # the curve turns by less than 60 deg within eta: Newton's first slope is at least 1/2
+        for _ in range(6):  # the curve turns by less than 60 deg within eta: Newton's first slope is at least 1/2
             point, slope = self._straightened(t)
             t -= (((point - start) * along).sum(axis=1) - eta) / (slope * along).sum(axis=1)
         offset: Reals = ((self._straightened(t)[0] - start) * below).sum(axis=1)
@@ -160,9 +154,7 @@ class Profile:
         """Where the head's tangent falls inward by ``cant`` [m]."""
         top = float(self.y[np.argmin(self.z)])
         try:
-            return float(
-                brentq(lambda y: float(self.height(y, 1)) + cant, top - 25e-3, top + 1e-3, xtol=1e-12)
-            )
+            return float(brentq(lambda y: float(self.height(y, 1)) + cant, top - 25e-3, top + 1e-3, xtol=1e-12))
         except ValueError:
             raise InputError(
                 f"rail profile {self.name!r}: no point within 25 mm inside its top is inclined by {cant}; "
@@ -197,9 +189,7 @@ def _increasing_run(y: Reals, inside: int) -> tuple[int, int]:
 def profile_names() -> list[str]:
     """Names of the profiles of the library."""
     folder = resources.files("tiengine.library") / "profiles"
-    return sorted(
-        entry.name.removesuffix(".csv") for entry in folder.iterdir() if entry.name.endswith(".csv")
-    )
+    return sorted(entry.name.removesuffix(".csv") for entry in folder.iterdir() if entry.name.endswith(".csv"))
 
 
 def load_profile(

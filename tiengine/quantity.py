@@ -48,9 +48,7 @@ def Q(unit: str, description: str = "", **rule: Any) -> Any:
     Returns:
         A pydantic ``Field`` carrying the unit in its JSON schema.
     """
-    return Field(
-        description=description or None, json_schema_extra={"unit": unit}, allow_inf_nan=False, **rule
-    )
+    return Field(description=description or None, json_schema_extra={"unit": unit}, allow_inf_nan=False, **rule)
 
 
 class Params(BaseModel):

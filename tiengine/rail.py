@@ -1,7 +1,7 @@
 """The rail in the moving window: a Timoshenko beam with five fields and convective inertia (MODEL §1).
 
 Trial functions on the window 0 <= s <= l: sin(k_i s) for v, w, theta_x and cos(k_i s) for theta_y, theta_z, with
-k_i = i pi / l, i = 1..N. The inertia of a field of mass density mu is mu (u'' in time - 2 V du'/dt + V^2 u'' - dV/dt u'),
+k_i = i pi / l, i = 1..N. The inertia of a field of mass density mu is mu (d2u/dt2 - 2 V du'/dt + V^2 u'' - dV/dt u'),
 projected in this strong form, so that the cosine fields carry the flux through the window's ends.
 
 Symbols: w, v vertical and lateral displacement; theta_y, theta_z slopes of the section (shear strains w' - theta_y,
@@ -80,8 +80,7 @@ class RailWindow:
     @property
     def wave_numbers(self) -> NDArray[np.float64]:
         """k_i = i pi / l [1/m], shape (N,)."""
-        k: NDArray[np.float64] = np.arange(1, self.modes + 1) * np.pi / self.length
-        return k
+        return np.arange(1.0, self.modes + 1.0) * (np.pi / self.length)
 
     @property
     def modal_masses(self) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.channels import MORTAR
 from tiengine.kernels import layout as at
 from tiengine.model import Model
 from tiengine.scenario import Scenario
@@ -64,6 +65,7 @@ class Recorder:
             "wheel": GroupSpec.standard("wheel", out.wheel_channels),
             "body": GroupSpec.standard("body", out.body_channels),
             "irregularity": GroupSpec.standard("irregularity", out.irregularity_channels, times_of="wheel"),
+            "mortar": GroupSpec.standard("mortar", tuple(MORTAR), times_of="body"),
         }
 
     def labels(self, model: Model) -> TrainLabels:
@@ -74,6 +76,7 @@ class Recorder:
             bodies=train.body_names,
             wheelset_vehicle=train.wheelset_vehicle,
             wheelset_offset=train.wheelset_x,
+            slots=model.given.slots,
         )
 
     def write(self, writer: Writer, chunk: Chunk, first: int, position: NDArray[np.float64]) -> None:
@@ -99,6 +102,16 @@ class Recorder:
             shape = (bodies, body.shape[-1] // 5, 5)  # a short last chunk may hold no sample of the bodies
             motion = {name: body[:, BODY_ROWS[name]].reshape(shape) for name in out.body_channels}
             writer.append(train, "body", time[at_bodies], position[at_bodies], motion)
+            pressure = chunk.mortar[train, :bodies]
+            held = _slabs_held(chunk.clock[: len(position)][at_bodies, at.FIRST_SLAB], pressure.shape[1])
+            bed = {"slab": held, "largest_pressure": pressure[..., 0], "smallest_pressure": pressure[..., 1]}
+            writer.append(train, "mortar", time[at_bodies], position[at_bodies], bed)
 
     def _steps(self, interval: float | str) -> int:
         return 1 if isinstance(interval, str) else max(1, round(interval / self.dt))
+
+
+def _slabs_held(first: NDArray[np.float64], slots: int) -> NDArray[np.float64]:
+    """Index of the slab in each slot, shape (steps, slots), from the window's rear slab, shape (steps,)."""
+    rear = first[:, None]
+    return rear + np.mod(np.arange(slots) - rear, slots)

@@ -56,9 +56,7 @@ def _number_or(word: str, unit: str, low: float, high: float) -> BeforeValidator
 def _check_speed(value: Any) -> Any:
     """A speed, or rows of chainage and speed."""
     if isinstance(value, tuple):
-        if len(value) < 2 or not all(
-            isinstance(r, tuple) and len(r) == 2 and all(map(_finite, r)) for r in value
-        ):
+        if len(value) < 2 or not all(isinstance(r, tuple) and len(r) == 2 and all(map(_finite, r)) for r in value):
             raise ValueError("must be a number or two or more rows [chainage_m, km/h]")
         if any(b[0] <= a[0] for a, b in pairwise(value)):
             raise ValueError("chainages must increase from row to row")
@@ -115,9 +113,7 @@ class Track(Params):
     fastening: Part = "ACE2021"
     friction: Annotated[float, Q("-", "coefficient of friction", gt=0, le=1)] = 0.3
     gauge: Annotated[float, Q("m", ge=0.6, le=2.0)] = 1.435
-    gauge_depth: Annotated[
-        float, Q("m", "below the top of the rail, where gauge is measured", gt=0, le=0.03)
-    ] = 0.016
+    gauge_depth: Annotated[float, Q("m", "below the top of the rail, where gauge is measured", gt=0, le=0.03)] = 0.016
     cant: Annotated[float, Q("-", "inward inclination of the rail", ge=0, le=0.1)] = 0.025
     mortar_no_tension: bool = False
     failed_fastenings: tuple[FailedFastenings, ...] = ()
@@ -135,9 +131,7 @@ class Contact(Params):
 class Numerics(Params):
     """How it is computed."""
 
-    modes_per_metre: Annotated[
-        float, Q("1/m", "trial functions per field and metre of window", ge=0.2, le=20)
-    ] = 2.0
+    modes_per_metre: Annotated[float, Q("1/m", "trial functions per field and metre of window", ge=0.2, le=20)] = 2.0
     window: Annotated[float | Literal["auto"], _number_or("auto", "m", 1.0, 2000.0)] = "auto"
     time_step: Annotated[float | Literal["auto"], _number_or("auto", "s", 1e-6, 1e-3)] = "auto"
     passes: Annotated[int, Q("-", "passes of the explicit half per step", ge=1, le=20)] = 2

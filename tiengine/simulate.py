@@ -15,7 +15,7 @@ from numpy.typing import NDArray  # noqa: E402
 from threadpoolctl import threadpool_limits  # noqa: E402
 
 from tiengine import backend  # noqa: E402
-from tiengine.events import RunFailed, check_chunk  # noqa: E402
+from tiengine.events import RunFailedError, check_chunk  # noqa: E402
 from tiengine.irregularity import Irregularity, make_irregularity  # noqa: E402
 from tiengine.kernels import layout as at  # noqa: E402
 from tiengine.model import Model, build_model  # noqa: E402
@@ -64,7 +64,7 @@ def run(
 
     Raises:
         InputError: The scenario breaks a rule, or the file cannot be written.
-        RunFailed: The train derailed or the numbers ran away; the file holds what was computed until then.
+        RunFailedError: The train derailed or the numbers ran away; the file holds what was computed until then.
     """
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     path = None if output is None else Path(output)
@@ -186,7 +186,7 @@ def _loop(
     }
     result = writer.close(attributes)
     if failure is not None:
-        raise RunFailed(failure)
+        raise RunFailedError(failure)
     return result
 
 

@@ -71,9 +71,7 @@ class Slab(Params):
     def _is_thin(cls, value: float, info: ValidationInfo) -> float:
         side = min(info.data.get("length", np.inf), info.data.get("width", np.inf))
         if value > THIN * side:
-            raise ValueError(
-                f"must be at most {THIN:g} of length and width for a thin plate, {THIN * side:g} m"
-            )
+            raise ValueError(f"must be at most {THIN:g} of length and width for a thin plate, {THIN * side:g} m")
         return value
 
     @field_validator("fastenings")
@@ -89,9 +87,7 @@ class Slab(Params):
                 f"it must equal length + gap = {pitch:.6f} m"
             )
         if known["fastening_pitch"] <= known["gap"]:
-            raise ValueError(
-                "the outer seats, fastening_pitch / 2 from the joint's middle, must lie on the slab"
-            )
+            raise ValueError("the outer seats, fastening_pitch / 2 from the joint's middle, must lie on the slab")
         return value
 
     @field_validator("seat_half_spacing")
@@ -215,9 +211,7 @@ def slab_matrices(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid] = ()) 
     return _build(slab, mortar, [list(voids)])[0]
 
 
-def slab_designs(
-    slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid]
-) -> tuple[list[SlabMatrices], dict[int, int]]:
+def slab_designs(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid]) -> tuple[list[SlabMatrices], dict[int, int]]:
     """Matrices of the intact slab and of every slab with voids.
 
     Args:
@@ -347,9 +341,7 @@ def _seats(
     return seat_index, table[:, :, 0].copy(), table[:, :, 2].copy(), seat_x
 
 
-def _locate(
-    place: NDArray[np.float64], size: float, elements: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _locate(place: NDArray[np.float64], size: float, elements: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Element and local coordinate (-1...1) of places measured from the centre of a row of elements."""
     along = (place / size + 0.5) * elements
     element: NDArray[np.int64] = np.clip(along.astype(np.int64), 0, elements - 1)

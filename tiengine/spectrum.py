@@ -66,9 +66,7 @@ class Spectrum(Params):
 
     def mean_factor(self, percentile: float) -> float:
         """Factor on S that gives its percentile p; only the Chinese spectrum has percentiles."""
-        raise InputError(
-            f"irregularity.percentile = {percentile:g}: not with the {self.title}, which has none"
-        )
+        raise InputError(f"irregularity.percentile = {percentile:g}: not with the {self.title}, which has none")
 
 
 class GermanSpectrum(Spectrum):

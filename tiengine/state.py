@@ -29,7 +29,8 @@ class State:
         design: Design of the slab in each slot, shape (B, slots).
         modal, seat_motion, seat_force: Fastening scratch and forces.
         pressure: Largest and smallest mortar pressure of each slab [Pa], shape (B, slots, 2).
-        rail_free, contact, force, wheelset_force, rail_force, wheelset_before, rail_before: Contact scratch; ``force`` starts the next solve.
+        rail_free, contact, force, wheelset_force, rail_force, wheelset_before, rail_before: Contact; ``force`` starts
+            the next solve.
         iterations: Most Newton iterations of each wheelset since last reset, shape (B, W).
         first_seat, first_slab: Rear seat and slab of the window.
     """

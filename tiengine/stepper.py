@@ -29,12 +29,14 @@ class Chunk:
         irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
         wheel: Recorded wheel output, shape (B, rows, W, 2, N_WHEEL).
         body: Recorded displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
+        mortar: Largest and smallest pressure of each slab [Pa], with the bodies, shape (B, rows, slots, 2).
     """
 
     clock: NDArray[np.float64]
     irregularity: NDArray[np.float64]
     wheel: NDArray[np.float64]
     body: NDArray[np.float64]
+    mortar: NDArray[np.float64]
 
     @classmethod
     def empty(cls, model: Model, steps: int, wheel_rows: int, body_rows: int) -> Chunk:
@@ -46,6 +48,7 @@ class Chunk:
             irregularity=np.zeros((B, steps, W, at.N_IRREGULARITY)),
             wheel=np.zeros((B, max(wheel_rows, 1), W, 2, at.N_WHEEL)),
             body=np.zeros((B, max(body_rows, 1), 3, 5 * bodies)),
+            mortar=np.zeros((B, max(body_rows, 1), int(d[at.SLOTS]), 2)),
         )
 
 
@@ -87,7 +90,8 @@ class Stepper:
                 self._tick, m.dims, m.constants, chunk.clock, m.given.contact.values, chunk.irregularity, m.wheel,
                 train.wheelset_dof, m.wheel_shape, b.wheelset_compliance, b.rail_compliance, b.vertical_response,
                 b.lateral_response, b.vehicle_response, s.motion, s.rail_free, s.contact, s.force, s.wheelset_force,
-                s.rail_force, s.wheelset_before, s.rail_before, s.iterations, chunk.wheel, chunk.body,
+                s.rail_force, s.wheelset_before, s.rail_before, s.iterations, s.pressure, chunk.wheel, chunk.body,
+                chunk.mortar,
             ),
             public=public,
         )  # fmt: skip

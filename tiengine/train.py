@@ -128,10 +128,7 @@ def assemble(
     bodies = _place(vehicles, centres)
     series = [vehicle.series_springs if series_springs is None else series_springs for vehicle in vehicles]
     internal = sum(
-        damper.k_series > 0.0
-        for vehicle, on in zip(vehicles, series, strict=True)
-        if on
-        for damper in vehicle.damper
+        damper.k_series > 0.0 for vehicle, on in zip(vehicles, series, strict=True) if on for damper in vehicle.damper
     )
     full = Assembly(bodies, internal)
     first = 0
@@ -208,9 +205,7 @@ def _reduce(full: Assembly, vehicles: Sequence[Vehicle], push: NDArray[np.float6
     )
 
 
-def _gyroscopic(
-    n: int, wheelset_dof: NDArray[np.int32], momentum: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _gyroscopic(n: int, wheelset_dof: NDArray[np.int32], momentum: NDArray[np.float64]) -> NDArray[np.float64]:
     """C_speed from the wheelsets' angular momentum per unit speed, J/r0 [kg m]."""
     roll, yaw = wheelset_dof[:, 2], wheelset_dof[:, 4]
     C_speed = np.zeros((n, n))
@@ -269,6 +264,4 @@ def _check_held(train: TrainModel, free: NDArray[np.intp]) -> None:
     values, vectors = np.linalg.eigh(scale[:, None] * K * scale)
     if len(free) and values[0] < 1e-10:
         dof = free[np.argmax(np.abs(vectors[:, 0]) * (free < train.n_dof))]
-        raise InputError(
-            f"{train.body_names[dof // 5]}: springs leave it free to move, mostly in {MOTIONS[dof % 5]}"
-        )
+        raise InputError(f"{train.body_names[dof // 5]}: springs leave it free to move, mostly in {MOTIONS[dof % 5]}")

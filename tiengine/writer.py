@@ -7,6 +7,7 @@
     /trains/000/wheel                   channels (time, wheelset, side), see tiengine.channels
     /trains/000/body                    channels (time, body, dof)
     /trains/000/irregularity            channels (time, wheelset, side)
+    /trains/000/mortar                  channels (time, slot)
 
 Every group holds its own coordinates as dimension scales: ``time`` [s], ``position`` [m] (chainage of the
 first vehicle's centre) and its labels. Groups sampled together share their times by hard links. Time and
@@ -53,12 +54,14 @@ class TrainLabels:
         bodies: Names of the bodies, unique in the train.
         wheelset_vehicle: Vehicle of each wheelset, from 0, shape (wheelsets,).
         wheelset_offset: Wheelset relative to the first vehicle's centre [m], shape (wheelsets,).
+        slots: Slabs in the window.
     """
 
     vehicles: Sequence[str]
     bodies: Sequence[str]
     wheelset_vehicle: NDArray[np.integer[Any]]
     wheelset_offset: Reals
+    slots: int = 0
 
     def scales(self, dimensions: Sequence[str]) -> dict[str, tuple[Any, Channel]]:
         """Values and meaning of the labels along some dimensions."""
@@ -70,6 +73,7 @@ class TrainLabels:
             "side": (list(SIDES), Channel("1", "side of the track, looking forward")),
             "body": (list(self.bodies), Channel("1", "body of the train")),
             "dof": (list(DOFS), Channel("1", "degree of freedom of a body")),
+            "slot": (np.arange(self.slots, dtype=np.int32), Channel("1", "place of a slab in memory")),
         }
         return {name: known[name] for name in dimensions}
 
@@ -91,7 +95,7 @@ class GroupSpec:
     @classmethod
     def standard(cls, group: str, names: Sequence[str], times_of: str | None = None) -> GroupSpec:
         """Some channels of one of the groups of :mod:`tiengine.channels`."""
-        dimensions = ("body", "dof") if group == "body" else ("wheelset", "side")
+        dimensions = {"body": ("body", "dof"), "mortar": ("slot",)}.get(group, ("wheelset", "side"))
         return cls(dimensions, {name: GROUPS[group][name] for name in names}, times_of)
 
 
@@ -283,9 +287,7 @@ class Writer:
     ) -> None:
         """One empty channel with its scales."""
         rest = tuple(group[dimension].shape[0] for dimension in spec.dimensions)
-        dataset = group.create_dataset(
-            name, (0, *rest), self._dtype, maxshape=(None, *rest), chunks=(CHUNK, *rest)
-        )
+        dataset = group.create_dataset(name, (0, *rest), self._dtype, maxshape=(None, *rest), chunks=(CHUNK, *rest))
         _describe(dataset, meaning).attrs["coordinates"] = " ".join(coordinates)
         for axis, dimension in enumerate(("time", *spec.dimensions)):
             dataset.dims[axis].attach_scale(group[dimension])

@@ -63,13 +63,13 @@ def _virtual_work() -> tuple[float, float]:
     found = _evaluate(wheelset, rails, channels)
     N = found.local[:, 0, :, 0]
     pull = N * np.cos(_penetration(found, rails, channels)[1])
-    total = N.sum(axis=1)
+    larger = N.max(axis=1)
     force, moment = 0.0, 0.0
     for q in range(3):  # y, z, roll of the wheelset
         nudge = NUDGE * np.eye(5)[q]
         p = [_penetration(_evaluate(wheelset + s * nudge, rails, channels), rails, channels)[0] for s in (1, -1)]
         exact = -(pull * (p[0] - p[1]) / (2.0 * NUDGE)).sum(axis=1)
-        error = np.nanmax(np.abs(found.wheelset[:, 0, q] - exact) / total)
+        error = np.nanmax(np.abs(found.wheelset[:, 0, q] - exact) / larger)
         force, moment = (force, max(moment, error)) if q == 2 else (max(force, error), moment)
     for q in range(3):  # w, v, theta_x of either rail
         nudge = NUDGE * np.eye(9)[q]

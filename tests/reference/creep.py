@@ -1,6 +1,7 @@
 """Hertz force and Shen-Hedrick-Elkins creep forces of one wheel, written from the formulas in plain NumPy.
 
-N = (delta/G)^(3/2); f11 = S a b C11, f22 = S a b C22, f23 = S (a b)^1.5 C23, f33 = S (a b)^2 C33 with the shear modulus S;
+N = (delta/G)^(3/2);
+f11 = S a b C11, f22 = S a b C22, f23 = S (a b)^1.5 C23, f33 = S (a b)^2 C33 with the shear modulus S;
 Tx = -f11 xi_x, Ty = -f22 xi_y - f23 xi_s, Mz = f23 xi_y - f33 xi_s; T' = mu N (tau - tau^2/3 + tau^3/27) for
 tau = T/(mu N) <= 3, else mu N (Shen, Hedrick and Elkins, 8th IAVSD, 1983).
 """

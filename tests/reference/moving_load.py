@@ -17,8 +17,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from numpy.polynomial import polynomial as poly
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
