@@ -8,7 +8,8 @@ forces of the pass before. Newton's method finds the forces f = (N, Fx, Fy) of b
     f = law(e),  e = (delta, creepages)(x_free + S B f)
 
 The Jacobian is I - D W with D = d law / d e and W = H S B; it leaves out how the geometry changes along the step, which
-the residual does not.
+the residual does not. A step that does not bring the forces nearer to the law is halved: at low speed saturating
+creepage would otherwise send the iterates to and fro.
 """
 
 import taichi as ti
@@ -17,7 +18,8 @@ from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
 from tiengine.kernels.types import Array, Reals1, Reals2, Reals3, Reals4, Template
 
-ITERATIONS = 25
+ITERATIONS = 50
+SMALLEST_SHARE = 1.0 / 128.0  # of a Newton step: below it the step is taken as it is
 
 
 @ti.func
@@ -192,6 +194,27 @@ def feedback(
 
 
 @ti.func
+def newton_step(
+    wheelset: int, V: float, constants: Array, residual: Template, D_l: Template, D_r: Template, B_l: Template,
+    B_r: Template, R_l: Template, R_r: Template, cos_l: float, cos_r: float, wheelset_compliance: Array,
+    rail_compliance: Array,
+):  # fmt: skip
+    """Solve (I - D W) step = residual for (N, Fx, Fy) of the left, then of the right wheel."""
+    ll = feedback(1, wheelset, V, constants, D_l, B_l, R_l, B_l, cos_l, wheelset_compliance, rail_compliance)
+    lr = feedback(0, wheelset, V, constants, D_l, B_l, R_l, B_r, cos_l, wheelset_compliance, rail_compliance)
+    rl = feedback(0, wheelset, V, constants, D_r, B_r, R_r, B_l, cos_r, wheelset_compliance, rail_compliance)
+    rr = feedback(1, wheelset, V, constants, D_r, B_r, R_r, B_r, cos_r, wheelset_compliance, rail_compliance)
+    J = ti.Matrix.identity(ti.f64, 6)
+    for m in ti.static(range(3)):
+        for n in ti.static(range(3)):
+            J[m, n] -= ll[m, n]
+            J[m, 3 + n] -= lr[m, n]
+            J[3 + m, n] -= rl[m, n]
+            J[3 + m, 3 + n] -= rr[m, n]
+    return solve6(J, residual)
+
+
+@ti.func
 def solve_wheelset(
     b: int, wheelset: int, V: float, irregularity: Template, dims: Array, constants: Array, wheel: Array, dof: Array,
     table: Array, wheelset_compliance: Array, rail_compliance: Array, motion: Array, rail_free: Array, contact: Array,
@@ -218,6 +241,8 @@ def solve_wheelset(
     tolerance = constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD]
     iterations = 0
     change = 2.0 * tolerance
+    share, best = 1.0, 1e300
+    base_l, base_r, step = f_l, f_r, ti.Vector.zero(ti.f64, 6)
     while change > tolerance and iterations < ITERATIONS:
         B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, place_l)
         B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, place_r)
@@ -237,30 +262,24 @@ def solve_wheelset(
         place_l, place_r = wr.placing(left), wr.placing(right)
         law_l, D_l = wr.contact_law(left, constants[at.FRICTION])
         law_r, D_r = wr.contact_law(right, constants[at.FRICTION])
-        ll = feedback(1, wheelset, V, constants, D_l, B_l, R_l, B_l, left[wr.COS], wheelset_compliance, rail_compliance)
-        lr = feedback(0, wheelset, V, constants, D_l, B_l, R_l, B_r, left[wr.COS], wheelset_compliance, rail_compliance)
-        rl = feedback(
-            0, wheelset, V, constants, D_r, B_r, R_r, B_l, right[wr.COS], wheelset_compliance, rail_compliance
-        )
-        rr = feedback(
-            1, wheelset, V, constants, D_r, B_r, R_r, B_r, right[wr.COS], wheelset_compliance, rail_compliance
-        )
-        J = ti.Matrix.identity(ti.f64, 6)
         residual = ti.Vector.zero(ti.f64, 6)
         for m in ti.static(range(3)):
             residual[m] = law_l[m] - f_l[m]
             residual[3 + m] = law_r[m] - f_r[m]
-            for n in ti.static(range(3)):
-                J[m, n] -= ll[m, n]
-                J[m, 3 + n] -= lr[m, n]
-                J[3 + m, n] -= rl[m, n]
-                J[3 + m, 3 + n] -= rr[m, n]
-        step = solve6(J, residual)
-        change = 0.0
+        size = residual.norm()
+        if size > (1.0 - 0.1 * share) * best and size > tolerance and share > SMALLEST_SHARE:
+            share *= 0.5  # the step did not bring the forces nearer to the law: go half of it
+        else:
+            step = newton_step(
+                wheelset, V, constants, residual, D_l, D_r, B_l, B_r, R_l, R_r, left[wr.COS], right[wr.COS],
+                wheelset_compliance, rail_compliance,
+            )  # fmt: skip
+            share, best = 1.0, size
+            base_l, base_r = f_l, f_r
+            change = ti.abs(step).max()
         for m in ti.static(range(3)):
-            f_l[m] += step[m]
-            f_r[m] += step[3 + m]
-            change = ti.max(change, ti.max(ti.abs(step[m]), ti.abs(step[3 + m])))
+            f_l[m] = base_l[m] + share * step[m]
+            f_r[m] = base_r[m] + share * step[3 + m]
         f_l[3], f_r[3] = law_l[3], law_r[3]
         iterations += 1
     B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, place_l)

@@ -17,25 +17,22 @@ WW, W_THETA, THETA_Y, VV, V_THETA, THETA_Z, TORSION, WAVE2 = range(8)
 
 
 @ti.func
-def convective(base: int, n: int, i: int, V: float, V_rate: float, G: Array, kind: Template, motion: Array):
-    """Sum_j G_ij (2 V du_j/dt + dV/dt u_j) for the field that begins at ``base``; kind 0 sine, 1 cosine."""
-    total = 0.0
-    for j in range(n):
-        total += G[kind, i, j] * (
-            2.0 * V * motion[at.V_PREDICTED, base + j] + V_rate * motion[at.U_PREDICTED, base + j]
-        )
-    return total
+def prepare_flow(start: int, count: int, V: float, V_rate: float, motion: Array):
+    """Leave 2 V du/dt + dV/dt u in row X, which is free before the implicit solve."""
+    for i in range(start, start + count):
+        motion[at.X, i] = 2.0 * V * motion[at.V_PREDICTED, i] + V_rate * motion[at.U_PREDICTED, i]
 
 
 @ti.func
 def field_force(
-    base: int, n: int, i: int, V: float, V_rate: float, half_mass: float, per_length: float, k2: float, G: Array,
-    kind: Template, motion: Array,
+    base: int, n: int, i: int, V: float, half_mass: float, per_length: float, k2: float, G: Array, kind: Template,
+    motion: Array,
 ):  # fmt: skip
-    """Convective force of one field: half_mass = mu l/2."""
-    return half_mass * V * V * k2 * motion[at.U_PREDICTED, base + i] + half_mass * per_length * convective(
-        base, n, i, V, V_rate, G, kind, motion
-    )
+    """Convective force of one field: half_mass = mu l/2; kind 0 sine, 1 cosine."""
+    flow = 0.0
+    for j in range(n):
+        flow += G[kind, i, j] * motion[at.X, base + j]
+    return half_mass * (V * V * k2 * motion[at.U_PREDICTED, base + i] + per_length * flow)
 
 
 @ti.func
@@ -57,23 +54,25 @@ def rail_linear_forces(
     for rail in range(2):
         w = (b * 2 + rail) * 2 * n
         v = lateral + (b * 2 + rail) * 3 * n
+        prepare_flow(w, 2 * n, V, V_rate, motion)
+        prepare_flow(v, 3 * n, V, V_rate, motion)
         for i in range(n):
             k2 = stiffness[i, WAVE2]
             y, ty, l, tz, tx = w + i, w + n + i, v + i, v + n + i, v + 2 * n + i
-            motion[at.LINEAR, y] = field_force(w, n, i, V, V_rate, mass[0], per_length, k2, G, 0, motion) - (
+            motion[at.LINEAR, y] = field_force(w, n, i, V, mass[0], per_length, k2, G, 0, motion) - (
                 stiffness[i, WW] * motion[u, y] + stiffness[i, W_THETA] * motion[u, ty]
             )
-            motion[at.LINEAR, ty] = field_force(w + n, n, i, V, V_rate, mass[1], per_length, k2, G, 1, motion) - (
+            motion[at.LINEAR, ty] = field_force(w + n, n, i, V, mass[1], per_length, k2, G, 1, motion) - (
                 stiffness[i, W_THETA] * motion[u, y] + stiffness[i, THETA_Y] * motion[u, ty]
             )
-            motion[at.LINEAR, l] = field_force(v, n, i, V, V_rate, mass[2], per_length, k2, G, 0, motion) - (
+            motion[at.LINEAR, l] = field_force(v, n, i, V, mass[2], per_length, k2, G, 0, motion) - (
                 stiffness[i, VV] * motion[u, l] + stiffness[i, V_THETA] * motion[u, tz]
             )
-            motion[at.LINEAR, tz] = field_force(v + n, n, i, V, V_rate, mass[3], per_length, k2, G, 1, motion) - (
+            motion[at.LINEAR, tz] = field_force(v + n, n, i, V, mass[3], per_length, k2, G, 1, motion) - (
                 stiffness[i, V_THETA] * motion[u, l] + stiffness[i, THETA_Z] * motion[u, tz]
             )
             motion[at.LINEAR, tx] = (
-                field_force(v + 2 * n, n, i, V, V_rate, mass[4], per_length, k2, G, 0, motion)
+                field_force(v + 2 * n, n, i, V, mass[4], per_length, k2, G, 0, motion)
                 - stiffness[i, TORSION] * motion[u, tx]
             )
 

@@ -111,12 +111,12 @@ def contact_state(
     across = (
         dx[0] - V * x[4] - dx[2] * r_c - (rail_rate[1] - V * rail_slope[1]) - h_c * (rail_rate[2] - V * rail_slope[2])
     )
-    advance = V * (s / c) * (x[4] - rail_slope[1] - h_c * rail_slope[2] - y_slope)
+    advance = V * (s / c) * (x[4] - rail_slope[1] - h_c * rail_slope[2] - (r0 - r_c) * turn_slope - y_slope)
     down = (
         dx[1]
         + sigma * (b0 + s_w) * dx[2]
         - (rail_rate[0] + sigma * s_r * rail_rate[2])
-        - V * (z_slope + sigma * (b0 - b_i + u) * turn_slope)
+        - V * (z_slope + sigma * (y_r + s_r - b_i) * turn_slope)
         + sigma * advance
     )
     xi_x = (V * (1.0 - r_c / r0) + dx[3] * r_c - sigma * (b0 + s_w) * dx[4]) / V

@@ -41,7 +41,7 @@ def assert_refused(folder: Path, arguments: tuple[str, ...], *words: str) -> Non
         ("train.speed_kmh=0", ("train.speed_kmh = 0", "must be greater than 0")),
         ("numerics.window=10", ("numerics.window = 10", "shorter than the train")),
         ("numerics.time_step=0.5", ("numerics.time_step = 0.5", "must be 'auto' or a number between")),
-        ("irregularity.wavelength_min=0.05", ("wavelength_min = 0.05", "8 V dt")),
+        ("irregularity.wavelength_min=0.015", ("wavelength_min = 0.015", "8 V dt")),
     ],
 )
 def test_a_wrong_value(tmp_path, setting, words):

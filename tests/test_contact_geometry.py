@@ -87,10 +87,10 @@ def test_gap_slopes(pair: WheelRailPair) -> None:
 
 def test_table_shape_and_origin(table: ContactTable) -> None:
     """Nodes are multiples of the steps, one beyond the range at each end; the gap at (0, 0) is zero."""
-    assert table.values.shape == (583, 51, 10)
+    assert table.values.shape == (1163, 51, 10)
     assert table.values.flags.c_contiguous
     assert table.values.dtype == np.float64
-    assert table.u_min == pytest.approx(-16.05e-3)
+    assert table.u_min == pytest.approx(-16.025e-3)
     assert table.alpha_min == pytest.approx(-6.25e-3)
     assert np.isfinite(table.values).all()
     assert table.lookup(0.0, 0.0)[0] == 0.0

@@ -19,7 +19,9 @@ def forces() -> dict[str, list[NDArray[np.float64]]]:
     """Wheel forces of the first second at the instants of the longest step, by kind and step."""
     runs = [march("paper", dt=dt, duration=1.0) for dt in STEPS]
     return {
-        kind: [getattr(run, kind)[round(2e-4 / dt) - 1 :: round(2e-4 / dt)] for dt, run in zip(STEPS, runs, strict=True)]
+        kind: [
+            getattr(run, kind)[round(2e-4 / dt) - 1 :: round(2e-4 / dt)] for dt, run in zip(STEPS, runs, strict=True)
+        ]
         for kind in KINDS
     }
 

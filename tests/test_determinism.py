@@ -34,10 +34,20 @@ def assert_same_bits(a: March, b: March) -> None:
     np.testing.assert_array_equal(a.state.motion[:3], b.state.motion[:3])
 
 
-@pytest.mark.parametrize("options", [{}, {"parallel": True}, {"public": True}], ids=["again", "parallel", "public"])
+@pytest.mark.parametrize("options", [{}, {"public": True}], ids=["again", "public"])
 def test_same_bits(once, options):
-    """A second run; Taichi's parallel loop; public launches: same operations in the same order."""
+    """A second run; public launches: the same machine code on the same numbers."""
     assert_same_bits(once, march("paper", dt=1e-4, duration=DURATION, **options))
+
+
+def test_parallel_loop_agrees_to_rounding(once):
+    """The parallel kernels are other machine code, whose sums are associated otherwise (fast math): 4e-10 N measured.
+
+    So the bits of a run depend on whether its loop is the parallel one, never on the number of threads.
+    """
+    parallel = march("paper", dt=1e-4, duration=DURATION, parallel=True)
+    np.testing.assert_allclose(parallel.vertical, once.vertical, atol=1e-6)
+    np.testing.assert_allclose(parallel.lateral, once.lateral, atol=1e-6)
 
 
 def test_public_launch_of_a_run():

@@ -278,7 +278,7 @@ def test_seats_beyond_the_slabs_stand_on_rigid_ground() -> None:
 
 
 def test_smeared_part_is_the_mean_of_the_seats(model: Model) -> None:
-    """Averaged over where the seats stand, their stiffness is l/(2 d) k on each mode: the stand-in in the rail's block."""
+    """Averaged over where they stand, the seats are l/(2 d) k on each mode: the stand-in in the rail's block."""
     d, length, n = 0.63, 36.0, 24
     k = np.arange(1, n + 1) * np.pi / length
     starts = (np.arange(200) + 0.5) / 200 * d

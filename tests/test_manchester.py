@@ -75,6 +75,4 @@ def test_approach(row: int, span: float, rtol: float) -> None:
 
 def test_reference_point_of_a_canted_profile() -> None:
     """The benchmark's rail has y = 0 near its top; its crown is R sin(atan 1/40) inside it."""
-    assert float(RAIL.canted(0.025).y[0] - RAIL.y[0]) == pytest.approx(
-        0.3 * np.sin(np.arctan(0.025)), abs=2e-5
-    )
+    assert float(RAIL.canted(0.025).y[0] - RAIL.y[0]) == pytest.approx(0.3 * np.sin(np.arctan(0.025)), abs=2e-5)

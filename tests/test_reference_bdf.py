@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 from threadpoolctl import threadpool_limits
 
 from tiengine.irregularity import make_irregularity
-from tiengine.state import State
 from tiengine.start import equilibrium
+from tiengine.state import State
 
 from .reference.marching import KMH, march, model_of, scenario
 from .reference.semi_discrete import SemiDiscrete

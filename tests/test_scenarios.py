@@ -36,7 +36,11 @@ def assert_sane(vertical: np.ndarray, lateral: np.ndarray, static: float) -> Non
     [
         (("numerics.modes_per_metre=4", "numerics.window=36"), 2e-4, 0.5),  # 144 modes
         (("train.speed_kmh=5",), 2e-4, 0.5),
-        (("train.speed_kmh=20", "irregularity.spectrum='china_ballastless'", "irregularity.wavelength_min=2"), 2e-4, 0.5),
+        (
+            ("train.speed_kmh=20", "irregularity.spectrum='china_ballastless'", "irregularity.wavelength_min=2"),
+            2e-4,
+            0.5,
+        ),
     ],
     ids=["144 modes", "5 km/h", "20 km/h"],
 )
@@ -56,10 +60,7 @@ def test_walking_pace_is_quiet():
 @pytest.fixture(scope="module")
 def seats() -> dict[str, np.ndarray]:
     """Largest fastening forces of seats 40 to 89 while a train passes, sound and failed; shape (50, 2)."""
-    return {
-        name: _largest_seat_forces(*overrides)
-        for name, overrides in (("sound", DEFECTS[2:]), ("failed", DEFECTS))
-    }
+    return {name: _largest_seat_forces(*overrides) for name, overrides in (("sound", DEFECTS[2:]), ("failed", DEFECTS))}
 
 
 def _largest_seat_forces(*overrides: str) -> np.ndarray:
@@ -86,12 +87,12 @@ def test_failed_fastenings_carry_nothing(seats):
     np.testing.assert_allclose(failed[:10], sound[:10], rtol=0.02)  # 6 m and more before
 
 
-def test_a_void_is_felt(seats):
-    """Fastenings over the hollow place (seats 76 and 77) stand on a softer slab."""
-    failed, sound = seats["failed"], seats["sound"]
-    change = np.abs(failed / sound - 1.0)[30:]
+def test_a_void_is_felt():
+    """Fastenings near the hollow place (seats 76 and 77) stand on a softer bed; those 6 m and more before do not know."""
+    change = np.abs(_largest_seat_forces(*DEFECTS[1:]) / _largest_seat_forces(*DEFECTS[2:]) - 1.0).max(axis=1)
     assert change.max() > 1e-3
-    assert 33 <= 30 + change.max(axis=1).argmax() <= 40
+    assert 73 <= 40 + change.argmax() <= 80
+    assert change[:26].max() < 0.1 * change.max()
 
 
 @pytest.mark.parametrize("defect", DEFECTS[:2])
@@ -188,9 +189,9 @@ def test_the_papers_slab_count():
 
 def test_auto_takes_the_longest_stable_step():
     """Whatever is stable in the trial and short enough for the irregularity."""
-    assert simulate.prepare(scenario("default")).given.newmark.dt == 2e-4
+    assert simulate.prepare(scenario("default"))[0].given.newmark.dt == 2e-4
     fine = scenario("default", "irregularity.wavelength_min=0.1")
-    assert simulate.prepare(fine).given.newmark.dt == 1e-4  # 8 V dt <= 0.1 m
+    assert simulate.prepare(fine)[0].given.newmark.dt == 1e-4  # 8 V dt <= 0.1 m
 
 
 def test_an_unstable_step_is_refused():
@@ -227,5 +228,8 @@ def test_the_trial_tells_what_blows_up(modes, dt, passes, damping, stable):
     with np.errstate(all="ignore"):
         assert (energy_growth(model, 350.0 * KMH) <= TOLERATED_GROWTH) == stable
         run = march("default", *overrides, dt=dt, duration=0.2, model=model)
-    bounded = bool(np.isfinite(run.wheel).all()) and np.abs(run.vertical).max() < 4.0 * static_wheel_loads(model.given.train).max()
+    bounded = (
+        bool(np.isfinite(run.wheel).all())
+        and np.abs(run.vertical).max() < 4.0 * static_wheel_loads(model.given.train).max()
+    )
     assert bounded == stable

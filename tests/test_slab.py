@@ -212,9 +212,7 @@ def test_lateral_bed(slab_and_mortar: tuple[Slab, Mortar], matrices: SlabMatrice
         assert not K[:-2, -2:].any()
 
 
-def test_void_takes_its_share_of_the_bed(
-    slab_and_mortar: tuple[Slab, Mortar], matrices: SlabMatrices
-) -> None:
+def test_void_takes_its_share_of_the_bed(slab_and_mortar: tuple[Slab, Mortar], matrices: SlabMatrices) -> None:
     """Total stiffness and damping fall by (1 - factor) k A_void, edges anywhere, laterally as well."""
     slab, mortar = slab_and_mortar
     void = MortarVoid(slab=0, x_from=0.123, x_to=2.71, y_from=-1.11, y_to=0.4567, factor=0.2)

@@ -75,7 +75,6 @@ class IrregularityParams(Params):
     short_wave_min: Annotated[float, Q("m", "shortest wave of the rail roughness", gt=0, validate_default=True)] = 0.08
     taper: Annotated[float, Q("m", "length over which the irregularity begins", gt=0)] = 30.0
     file: str | None = None
-    cross_level_rolls_rails: bool = True
 
     @field_validator("spectrum")
     @classmethod

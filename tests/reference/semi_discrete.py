@@ -38,7 +38,10 @@ class SemiDiscrete:
         self.model, self.track, self.V, self.slabs = model, track, V, slabs
         g = model.given
         sound, train = g.designs.matrices[0], g.train
-        rail = [la.block_diag(*(m.toarray() for m in pair)) for pair in zip(model.window.vertical(V), model.window.lateral(V), strict=True)]
+        rail = [
+            la.block_diag(*(m.toarray() for m in pair))
+            for pair in zip(model.window.vertical(V), model.window.lateral(V), strict=True)
+        ]
         slab = [sound.M, sound.C_bed, sound.K_plate + sound.K_bed]
         vehicle = [train.M, train.C + V * train.C_speed, train.K]
         self.M, self.C, self.K = (
@@ -75,9 +78,7 @@ class SemiDiscrete:
         k = self.model.window.wave_numbers
         return here, np.sin(np.outer(s[here], k)), -self.V * k * np.cos(np.outer(s[here], k))
 
-    def fastening_forces(
-        self, t: float, u: NDArray[np.float64], v: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def fastening_forces(self, t: float, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Generalised forces of all fastenings, shape (n,)."""
         here, phi, rate = self.shapes(t)
         rail_u, rail_v = (x[: self.first_slab_dof].reshape(2, 5, -1)[:, [0, 2, 4]] for x in (u, v))
