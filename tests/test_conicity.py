@@ -14,9 +14,7 @@ EUROPE = {"gauge_depth": 0.014, "half_spacing": 0.75, "wheel_radius": 0.46}
 
 def make_pair(wheel: str, rail: str, **settings: float) -> WheelRailPair:
     """A pair of the library."""
-    return WheelRailPair(
-        load_profile(wheel, "wheel"), load_profile(rail, "rail"), ContactSettings(**settings)
-    )
+    return WheelRailPair(load_profile(wheel, "wheel"), load_profile(rail, "rail"), ContactSettings(**settings))
 
 
 def test_lma_chn60_stations() -> None:

@@ -59,9 +59,7 @@ def test_flank_on_gauge_corner(pair: WheelRailPair) -> None:
     gamma = np.radians(70.0) - alpha
     o_r, z_r = canted_centre(-22.40885e-3, 14.83429e-3)
     s_r = o_r - 13e-3 * np.sin(gamma)
-    np.testing.assert_allclose(
-        found.s_r, s_r, atol=1e-6
-    )  # slope to 1e-5 on 1/13 mm curvature, over cos gamma
+    np.testing.assert_allclose(found.s_r, s_r, atol=1e-6)  # slope to 1e-5 on 1/13 mm curvature, over cos gamma
     np.testing.assert_allclose(found.tan_gamma, np.tan(gamma), rtol=1e-4)
     # a point of the flank's line, its joint to R14
     o_w = u + offset - 38.02522e-3 * np.cos(alpha) - 12.06763e-3 * np.sin(alpha)
@@ -244,9 +242,7 @@ def test_refusals(pair: WheelRailPair) -> None:
     with pytest.raises(InputError, match="'LMA' is that of a wheel; a rail profile expected"):
         WheelRailPair(pair.wheel, pair.wheel, pair.settings)
     short = Profile("narrow", "wheel", pair.wheel.y[500:-500], pair.wheel.z[500:-500])
-    with pytest.raises(
-        InputError, match=r"'narrow' on rail 'CHN60': no contact inside both profiles at u = .* mm"
-    ):
+    with pytest.raises(InputError, match=r"'narrow' on rail 'CHN60': no contact inside both profiles at u = .* mm"):
         build_contact_table(short, pair.rail, pair.settings)
     with pytest.raises(ValueError, match=r"less than or equal to 0\.00005"):
         ContactSettings(du=1e-4)

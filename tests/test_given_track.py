@@ -7,9 +7,7 @@ from tiengine.irregularity import IrregularityParams, from_function, make_irregu
 from tiengine.quantity import InputError
 
 FAR = -1e9  # the irregularity has begun long before any chainage of these tests
-MEASURED = "x,z_v,theta\n# by hand\n" + "".join(
-    f"{x},{0.001 * (x % 3)},{1e-4 * x}\n" for x in range(0, 100, 2)
-)
+MEASURED = "x,z_v,theta\n# by hand\n" + "".join(f"{x},{0.001 * (x % 3)},{1e-4 * x}\n" for x in range(0, 100, 2))
 
 
 def test_user_function_as_spline():
@@ -42,9 +40,7 @@ def test_user_function_with_slopes():
     def slopes(x):
         return 2 * x, 1.0, 0.0, 0.0
 
-    sampled = from_function(parabola, slopes=slopes, taper_start=0.0, taper=10.0).sample(
-        np.array([5.0, 20.0])
-    )
+    sampled = from_function(parabola, slopes=slopes, taper_start=0.0, taper=10.0).sample(np.array([5.0, 20.0]))
     T, dT = 0.5, 30 / 16 / 10.0  # the step's middle
     assert sampled[0] == pytest.approx([25 * T, 5 * T, 0, 0, 10 * T + 25 * dT, T + 5 * dT, 0, 0])
     assert sampled[1] == pytest.approx([400, 20, 0, 0, 40, 1, 0, 0])

@@ -45,9 +45,7 @@ def test_coefficients_of_the_ellipse(beta: float, m: float, n: float, r: float) 
     a, b, G = hertz([small, large], [large, small], E, NU)
     unit = (3.0 * (1.0 - NU**2) / (2.0 * E * total)) ** (1.0 / 3.0)
     approach = ((1.5 * (1.0 - NU**2) / E) ** 2 * total) ** (1.0 / 3.0)
-    rounding = (
-        5e-6 / 0.12
-    )  # half a unit of the last digit of the smallest entry, the coarsest relative rounding
+    rounding = 5e-6 / 0.12  # half a unit of the last digit of the smallest entry, the coarsest relative rounding
     np.testing.assert_allclose(a / unit, [m, n], rtol=rounding)
     np.testing.assert_allclose(b / unit, [n, m], rtol=rounding)
     np.testing.assert_allclose(G / approach, r, rtol=rounding)

@@ -128,9 +128,7 @@ def test_random_access_equals_sequential_access(settings, start):
     order = np.random.default_rng(1).permutation(x.size)
     assert np.array_equal(other.sample(x[order]), sequential[order])
     other.sample(np.linspace(-3e4, 3e4, 50))
-    assert np.array_equal(
-        other.sample(x[: 2 * (x.size // 2)].reshape(2, -1))[1, 7], sequential[x.size // 2 + 7]
-    )
+    assert np.array_equal(other.sample(x[: 2 * (x.size // 2)].reshape(2, -1))[1, 7], sequential[x.size // 2 + 7])
     for i in order[:40]:
         assert np.array_equal(other.sample(x[i]), sequential[i])
 
@@ -271,12 +269,8 @@ def test_wheels():
     sampled = np.arange(1.0, 17.0).reshape(2, 8)
     left, right = at_wheels(sampled)[1]
     z_v, y_a, theta, g, dz_v, dy_a, dtheta, dg = sampled[1]
-    assert left == pytest.approx(
-        [z_v - HALF_BASE * theta, y_a - g / 2, dz_v - HALF_BASE * dtheta, dy_a - dg / 2]
-    )
-    assert right == pytest.approx(
-        [z_v + HALF_BASE * theta, y_a + g / 2, dz_v + HALF_BASE * dtheta, dy_a + dg / 2]
-    )
+    assert left == pytest.approx([z_v - HALF_BASE * theta, y_a - g / 2, dz_v - HALF_BASE * dtheta, dy_a - dg / 2])
+    assert right == pytest.approx([z_v + HALF_BASE * theta, y_a + g / 2, dz_v + HALF_BASE * dtheta, dy_a + dg / 2])
 
 
 @pytest.mark.parametrize(

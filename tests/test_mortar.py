@@ -74,9 +74,7 @@ def slab_states(designs: list[SlabMatrices], motion: NDArray[np.float64]) -> NDA
     return motion[:2].reshape(2, TRAINS, -1)[:, :, LEAD:].reshape(2, TRAINS, SLABS, n)
 
 
-def pressures(
-    mortar: Mortar, m: SlabMatrices, u: NDArray[np.float64], v: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def pressures(mortar: Mortar, m: SlabMatrices, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
     """Pressure beyond the weight's at every quadrature point, in NumPy, shape (n_el, n_q)."""
     w, rate = (x[m.bed_index] @ m.bed_shape.T for x in (u, v))
     return m.bed_factor * (mortar.stiffness * w + mortar.damping * rate)
@@ -260,9 +258,7 @@ def test_voids_must_fit_their_slab() -> None:
 
     with pytest.raises(InputError, match=r"slab 7: x_to = 6: must be <= the slab's length, 5\.6 m"):
         bed_factors(5.6, 2.5, (9, 2), [void(x_to=6.0)])
-    with pytest.raises(
-        InputError, match=r"slab 7: y_to = 1\.3: must be within half the slab's width, 1\.25 m"
-    ):
+    with pytest.raises(InputError, match=r"slab 7: y_to = 1\.3: must be within half the slab's width, 1\.25 m"):
         bed_factors(5.6, 2.5, (9, 2), [void(y_to=1.3)])
     with pytest.raises(InputError, match=r"slab 7: x_from = 1\.5: overlaps the void from x = 1 to 2 m"):
         bed_factors(5.6, 2.5, (9, 2), [void(), void(x_from=1.5, x_to=3.0)])

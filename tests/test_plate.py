@@ -15,9 +15,7 @@ ACM_TERMS = [(i, j) for i in range(4) for j in range(4) if i + j <= 3 or (i, j) 
 """Powers (x, y) of the element's twelve monomials."""
 
 
-def monomials(
-    x: NDArray[np.float64], y: NDArray[np.float64], dx: int = 0, dy: int = 0
-) -> NDArray[np.float64]:
+def monomials(x: NDArray[np.float64], y: NDArray[np.float64], dx: int = 0, dy: int = 0) -> NDArray[np.float64]:
     """Derivatives of the twelve monomials, shape (points, 12)."""
 
     def power(z: NDArray[np.float64], p: int, order: int) -> NDArray[np.float64]:
@@ -67,9 +65,7 @@ def test_element_matrices_are_the_exact_integrals() -> None:
     points, weight = gauss(4)
     K, M, bed = np.zeros((3, 2, 1, 12, 12))
     factor = np.stack([np.ones((1, 16)), np.full((1, 16), 0.25)])
-    plate.element_matrices(
-        tabulate(points), weight, np.tile([D, nu, mass, rotary], (2, 1)), factor, K, M, bed
-    )
+    plate.element_matrices(tabulate(points), weight, np.tile([D, nu, mass, rotary], (2, 1)), factor, K, M, bed)
 
     def integral(p: int, half: float) -> float:
         return 0.0 if p % 2 else 2.0 * half ** (p + 1) / (p + 1)
@@ -83,9 +79,7 @@ def test_element_matrices_are_the_exact_integrals() -> None:
                 if min(powers) >= 0:
                     falls = [(i, left[0]), (k, right[0]), (j, left[1]), (m, right[1])]
                     factor = np.prod([np.prod(np.arange(p - o + 1, p + 1)) for p, o in falls if o])
-                    out[a, b] = (
-                        factor * integral(powers[0] + powers[1], A) * integral(powers[2] + powers[3], B)
-                    )
+                    out[a, b] = factor * integral(powers[0] + powers[1], A) * integral(powers[2] + powers[3], B)
         return out
 
     inverse = np.linalg.inv(corner_dofs())

@@ -134,9 +134,7 @@ def test_bad_files_are_refused(tmp_path, rows, message: str) -> None:
 
 def test_unknown_name_suggests_a_preset() -> None:
     """A slip of the pen is answered with the nearest name."""
-    with pytest.raises(
-        InputError, match="rail profile 'CHN6O': neither a file nor a preset; did you mean 'CHN60'"
-    ):
+    with pytest.raises(InputError, match="rail profile 'CHN6O': neither a file nor a preset; did you mean 'CHN60'"):
         load_profile("CHN6O", "rail")
 
 

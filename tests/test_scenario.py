@@ -143,9 +143,7 @@ def test_overrides(overrides):
 
 def test_override_inside_a_list():
     """Indices count list entries."""
-    scenario = load_scenario(
-        "defects", ["track.failed_fastenings.0.factor=0.5", "train.vehicles.0.car.mass=50e3"]
-    )
+    scenario = load_scenario("defects", ["track.failed_fastenings.0.factor=0.5", "train.vehicles.0.car.mass=50e3"])
     assert scenario.track.failed_fastenings[0].factor == 0.5
     assert scenario.parts.vehicles[0].body[0].mass == 50e3
 
@@ -269,9 +267,7 @@ def test_wavelength_limit_is_eight_steps():
     with pytest.raises(InputError, match=r"irregularity.wavelength_min = 1: must be at least 8 V dt"):
         check_wavelength(scenario, limit * (1 + 1e-9))
     check_wavelength(load_scenario("smooth"), limit * 2)
-    assert "8 V dt = 0.07778 m" in refusal(
-        "paper", ["irregularity.wavelength_min=0.07", "numerics.time_step=1e-4"]
-    )
+    assert "8 V dt = 0.07778 m" in refusal("paper", ["irregularity.wavelength_min=0.07", "numerics.time_step=1e-4"])
 
 
 def test_train_of_three():
@@ -344,9 +340,7 @@ def test_rail_presets_are_consistent(name):
     rail = load_toml(find_preset("rails", name))
     assert rail["rho"] * rail["A"] == pytest.approx(rail["mass_per_length"], rel=1e-3)
     assert rail["Iy"] + rail["Iz"] == pytest.approx(rail["I_polar"], rel=1e-3)
-    assert rail["E"] / (2 * (1 + rail["nu"])) == pytest.approx(
-        rail["G"], rel=3e-3
-    )  # 7.919e10 published as 7.9e10
+    assert rail["E"] / (2 * (1 + rail["nu"])) == pytest.approx(rail["G"], rel=3e-3)  # 7.919e10 published as 7.9e10
 
 
 @pytest.mark.parametrize("name", preset_names("fastenings"))

@@ -88,7 +88,7 @@ def test_failed_fastenings_carry_nothing(seats):
 
 
 def test_a_void_is_felt():
-    """Fastenings near the hollow place (seats 76 and 77) stand on a softer bed; those 6 m and more before do not know."""
+    """Fastenings near the hollow place (seats 76 and 77) stand on a softer bed; those 6 m before do not know."""
     change = np.abs(_largest_seat_forces(*DEFECTS[1:]) / _largest_seat_forces(*DEFECTS[2:]) - 1.0).max(axis=1)
     assert change.max() > 1e-3
     assert 73 <= 40 + change.argmax() <= 80
@@ -116,7 +116,7 @@ def test_a_defect_under_the_first_window(defect):
 
 
 def test_no_tension_differs_only_where_the_bed_lets_go():
-    """Under a heavy slab the bed always presses and the bits are those of the linear bed; under a light one it lets go."""
+    """Under a heavy slab the bed always presses: the bits of the linear bed. Under a light one it lets go."""
     density = "track.slab={like = 'CRTS_III', rho = %g}"
     light, heavy = (
         [

@@ -84,7 +84,7 @@ def test_ripple_has_the_size_of_the_tracks_contrast(smooth):
     """Above the wheel's resonance on the track (60 Hz) the wheel stays and the track's varying stiffness pushes.
 
     A static deflection w that varies by a share c from seat to mid-span then gives an amplitude of F c / 2, times
-    1 / (1 - (60 / 154)^2) = 1.2; slab ends add harmonics of similar size. So peak to peak lies between c/2 and 3 c of F.
+    1 / (1 - (60 / 154)^2) = 1.2; slab ends add harmonics of similar size. Peak to peak: c/2 to 3 c of F.
     """
     run, _ = smooth
     model = run.model
@@ -178,7 +178,7 @@ def test_file_opens_in_xarray(file):
 def test_forces_have_the_expected_size(file):
     """German low disturbance at 350 km/h: 69 +- 20 kN, lateral forces of a few kN (published codes and MODEL 11).
 
-    The standard deviation from two seconds scatters by a fifth: its waves are 1 to 120 m long, 200 m are few of the long.
+    The standard deviation from two seconds scatters by a fifth: 200 m hold few of its long waves (120 m).
     """
     with xarray.open_dataset(file, group="trains/000/wheel", engine="h5netcdf") as wheel:
         late = wheel.isel(time=wheel.position.values > 18.0 + 50.0)

@@ -119,9 +119,7 @@ def test_contact_filter():
     a = 6e-3
     half = (4 / np.pi) ** (1 / 3) / a
     assert contact_filter(np.array([half]), a)[0] == pytest.approx(0.5, rel=1e-14)
-    assert contact_filter(np.array([2 * np.pi]), a)[0] == pytest.approx(
-        1.0, abs=1e-4
-    )  # (pi/4)(0.038)^3 = 4e-5
+    assert contact_filter(np.array([2 * np.pi]), a)[0] == pytest.approx(1.0, abs=1e-4)  # (pi/4)(0.038)^3 = 4e-5
     short = contact_filter(np.array([100.0, 200.0]) / a, a)
     assert short[0] / short[1] == pytest.approx(8.0, rel=1e-5)
 

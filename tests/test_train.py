@@ -100,10 +100,7 @@ def test_braking_moves_load_to_the_front(name, effort):
     and with the rims -Vdot sum J/r0 besides. Longitudinal springs are softened a thousandfold: without a
     longitudinal coordinate they hold the pitch of car and frames (by up to 5 %), which is not equilibrium.
     """
-    soft = {
-        key: {"kx": 1e-3 * load_toml(find_preset("vehicles", name))[key]["kx"]}
-        for key in ("primary", "secondary")
-    }
+    soft = {key: {"kx": 1e-3 * load_toml(find_preset("vehicles", name))[key]["kx"]} for key in ("primary", "secondary")}
     vehicle = changed(name, **soft)
     train = assemble([vehicle], effort=effort)
     level = vehicle.wheel_radius if effort == "axles" else 0.0

@@ -44,9 +44,7 @@ def samples(group: str, train: int, first: int, count: int) -> dict[str, np.ndar
     }
 
 
-def write(
-    path: Path | None, *, trains: int = 1, chunks: tuple[int, ...] = (700, 1, 1300), **options
-) -> results.Result:
+def write(path: Path | None, *, trains: int = 1, chunks: tuple[int, ...] = (700, 1, 1300), **options) -> results.Result:
     """A run of some chunks; the bodies are sampled at every tenth step."""
     toml = options.pop("toml", 'name = "fake"\n')
     with Writer(path, toml, {"seed": 3}, [LABELS] * trains, GROUPS, **options) as writer:

@@ -24,7 +24,7 @@ NUDGE = np.concatenate([np.full(5, 1e-9), np.full(5, 1e-7), np.full(18, 1e-9)])
 
 
 class SemiDiscrete:
-    """M u'' + C u' + K u + fastenings(t, u, u') = gravity + suspension + contact(t, u, u'), one train, constant speed."""
+    """M u'' + C u' + K u + fastenings(t, u, u') = gravity + suspension + contact(t, u, u'); one train, constant V."""
 
     def __init__(self, model: Model, track: Irregularity, V: float, slabs: range) -> None:
         """Assemble.
