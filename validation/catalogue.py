@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from validation import (
+    bdf,
     contact_geometry,
     contact_kinematics,
     hertz_kalker,
@@ -33,6 +34,7 @@ _FILES = (
     irregularity,
     smooth_track,
     time_stepping,
+    bdf,
     robustness,
     paper_case,
 )

@@ -112,13 +112,4 @@ CASES = (
         )
         for direction in ("vertical", "lateral")
     ),
-    Case(
-        name="bdf",
-        kind="verification",
-        quantity="first 0.05 s against scipy's BDF at rtol 1e-8, short window",
-        source="the same right-hand side, assembled apart from the step",
-        reference=0.0,
-        why="made by pytest -m slow tests/test_reference_bdf.py",
-        compute=None,
-    ),
 )

@@ -155,7 +155,7 @@ class SemiDiscrete:
         return motion[2]
 
     def jacobian(self, t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """d rhs / dy; the nonlinear suspension's deviations left out (a solver needs it only to converge)."""
+        """Derivative of the right-hand side by y; the nonlinear suspension's deviations left out (a solver needs it only to converge)."""
         u, v, n = y[: self.n], y[self.n :], self.n
         E, F, k, c = self.fastenings(t)
         by_u = -self.K - E.T @ (k[:, None] * E + c[:, None] * F)
@@ -196,7 +196,7 @@ class SemiDiscrete:
         return out
 
     def pack(self, state: State) -> NDArray[np.float64]:
-        """y of an engine's state whose window begins at the first of the slabs."""
+        """The y of an engine's state whose window begins at the first of the slabs."""
         halves = []
         for row in (at.U, at.V):
             vertical, lateral = state.view(row, "vertical")[0], state.view(row, "lateral")[0]
