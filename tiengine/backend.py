@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import os
+import contextlib
+import io
 import time
 
 import taichi as ti
@@ -22,16 +23,16 @@ def start(threads: int = 1, debug: bool = False) -> float:
     """
     if not _started:
         clock = time.perf_counter()
-        os.environ.setdefault("TI_ENABLE_PYBUF", "0")
-        ti.init(
-            arch=ti.cpu,
-            default_fp=ti.f64,
-            default_ip=ti.i32,
-            fast_math=not debug,
-            debug=debug,
-            cpu_max_num_threads=threads,
-            offline_cache=True,
-            log_level=ti.WARN,
-        )
+        with contextlib.redirect_stdout(io.StringIO()):  # ti.init prints a line whatever the log level
+            ti.init(
+                arch=ti.cpu,
+                default_fp=ti.f64,
+                default_ip=ti.i32,
+                fast_math=not debug,
+                debug=debug,
+                cpu_max_num_threads=threads,
+                offline_cache=True,
+                log_level=ti.WARN,
+            )
         _started["seconds"] = time.perf_counter() - clock
     return _started["seconds"]

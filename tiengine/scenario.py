@@ -138,7 +138,7 @@ class Numerics(Params):
     start: Literal["equilibrium", "zero"] = "equilibrium"
     mortar: Literal["implicit", "explicit"] = "implicit"
     slab_count: Literal["cover", "paper"] = "cover"
-    threads: Annotated[int, Q("-", ge=1, le=1024)] = 1
+    threads: Annotated[int, Q("-", "of Taichi's loop over trains; one train alone runs on one", ge=1, le=1024)] = 1
 
     def modes(self, window: float) -> int:
         """Trial functions of each rail field in a window of the given length [m]."""

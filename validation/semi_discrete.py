@@ -155,7 +155,7 @@ class SemiDiscrete:
         return motion[2]
 
     def jacobian(self, t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivative of the right-hand side by y; the nonlinear suspension's deviations left out (a solver needs it only to converge)."""
+        """Derivative of the right-hand side by y without the nonlinear suspension; a solver needs it to converge."""
         u, v, n = y[: self.n], y[self.n :], self.n
         E, F, k, c = self.fastenings(t)
         by_u = -self.K - E.T @ (k[:, None] * E + c[:, None] * F)
