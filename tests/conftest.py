@@ -14,7 +14,12 @@ sys.path.append(
 )  # validation's closed forms; last, so that the installed engine is tested
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--ti-debug``: bounds checks in every kernel."""
+    parser.addoption("--ti-debug", action="store_true", help="compile Taichi kernels with bounds checks (slow)")
+
+
 @pytest.fixture(scope="session", autouse=True)
-def taichi() -> None:
+def taichi(pytestconfig: pytest.Config) -> None:
     """Start Taichi once; every kernel of the session shares it."""
-    backend.start()
+    backend.start(debug=pytestconfig.getoption("--ti-debug"))

@@ -12,6 +12,11 @@ iterate. A_s = beta dt^2 K_s + gamma dt C_s is a constant stand-in for the part 
 diverge: fastenings smeared along the rail. It drops out as the passes converge. With beta = 1/4, gamma = 1/2 the
 method is of second order; two passes keep that order, because the first leaves an error of order dt^2 in a.
 
+A_s leaves out the smeared fastenings' convective part -V c d/ds, a few per cent of the rest: being no more than a
+stand-in, it changes how fast the passes converge, not what to. The slabs' blocks hold their seats exactly, also those
+that stand outside the window at the moment and exert no force: there the block carries some kilograms too much
+(gamma dt c + beta dt^2 k a seat, of order dt), on slabs that the wheels do not reach.
+
 | symbol | meaning |
 |---|---|
 | M, C, K | mass, damping and convection, stiffness of the linear constant part |
