@@ -135,7 +135,7 @@ class RailWindow:
         masses = self.modal_masses[list(fields)]
         G = sine_products(self.modes)
         M = sp.diags_array(np.repeat(masses, self.modes))
-        flow = sp.block_diag([m / half * G[kind] for m, kind in zip(masses, kinds, strict=True)])
+        flow = sp.block_diag([sp.csr_array(m / half * G[kind]) for m, kind in zip(masses, kinds, strict=True)])
         softening = sp.diags_array(np.concatenate([m * V**2 * k2 for m in masses]))
         return sp.csr_array(M), sp.csr_array(-2.0 * V * flow), sp.csr_array(K - softening - V_rate * flow)
 
