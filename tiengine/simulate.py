@@ -92,9 +92,11 @@ def prepare(scenario: Scenario, public_launch: bool = False) -> tuple[Model, flo
     V = scenario.train.speed.at(0.0)[0]
     fastest = scenario.train.speed.fastest
     jit = 0.0
+    track = make_irregularity(scenario.irregularity, 0.0)  # a measured series has its own shortest wave
     for dt in AUTO_STEPS if asked == "auto" else (float(asked),):
         try:
             check_wavelength(scenario, dt)
+            track.check_step(fastest, dt)
         except InputError:
             if asked == "auto" and dt != AUTO_STEPS[-1]:
                 continue
@@ -193,9 +195,10 @@ def _loop(
 def _advance(stepper: Stepper, recorder: Recorder, done: int, count: int) -> None:
     """The steps of one chunk."""
     wheel_row = body_row = 0
+    wheel_every, body_every = recorder.wheel_every, recorder.body_every
     for i in range(count):
         k = done + i + 1
-        wheels, bodies = k % recorder.wheel_every == 0, k % recorder.body_every == 0
+        wheels, bodies = k % wheel_every == 0, k % body_every == 0
         stepper.step(i, wheel_row if wheels else -1, body_row if bodies else -1)
         wheel_row += wheels
         body_row += bodies
