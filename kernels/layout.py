@@ -96,6 +96,3 @@ MOTION_ROWS = 8
     RELATIVE_SHIFT,
     N_WHEEL,
 ) = range(18)
-
-# Seat quantities of one rail: displacement and material rate of w, v, theta_x.
-SEAT_W, SEAT_DW, SEAT_V, SEAT_DV, SEAT_ROLL, SEAT_DROLL = range(6)

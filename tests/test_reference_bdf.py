@@ -14,21 +14,12 @@ from threadpoolctl import threadpool_limits
 from tiengine.irregularity import make_irregularity
 from tiengine.start import equilibrium
 from tiengine.state import State
+from validation.bdf import RTOL, SHORT, SIZES, STEPS
 from validation.semi_discrete import SemiDiscrete
 
 from .reference.marching import KMH, march, model_of, scenario
 
 SPEED = 350.0 * KMH
-SHORT = (
-    "numerics.window=24.0",
-    "numerics.modes_per_metre=1",
-    "irregularity.spectrum='german_high'",
-    "irregularity.taper=2",
-    'track.slab={like="CRTS_III", elements_x=3, elements_y=1}',
-)
-RTOL = 1e-8
-SIZES = 1e-4, 1e-2  # m or rad, and their rates: what absolute tolerances are taken of
-STEPS = (1e-4, 5e-5, 2.5e-5)
 
 
 @pytest.fixture(scope="module")
