@@ -118,8 +118,12 @@ def store_force(
 
 
 @ti.func
-def rail_at_end(wheelset: int, free: Template, increment: Template, constants: Array, compliance: Array):
-    """Rail motion under a wheel at the end of the step, from that without the change of the wheel's force."""
+def rail_at_end(wheelset: int, free: Template, force: Template, before: Template, constants: Array, compliance: Array):
+    """Rail motion under a wheel at the end of the step, from that without the change of the wheel's force.
+
+    The modes left out answer to the whole force at once, without inertia; that they have rates is neglected.
+    """
+    increment = force - before
     r = free
     for m in ti.static(range(3)):
         value, slope = 0.0, 0.0
@@ -129,6 +133,7 @@ def rail_at_end(wheelset: int, free: Template, increment: Template, constants: A
         r[m] += constants[at.BETA_DT2] * value
         r[3 + m] += constants[at.BETA_DT2] * slope
         r[6 + m] += constants[at.GAMMA_DT] * value
+        r[m] += constants[at.RESIDUAL_VERTICAL + m] * force[m]
     return r
 
 
@@ -178,6 +183,9 @@ def feedback(
                         total += R[k, 2 * m] * rail_compliance[wheelset, 0, k, l] * R[l, 2 * n]
             if ti.static(m == 0):
                 W[m, n] = -constants[at.BETA_DT2] * total  # a wheel pushed up penetrates less
+                if ti.static(same == 1):
+                    for k in ti.static(range(3)):
+                        W[m, n] -= R[k, 0] * constants[at.RESIDUAL_VERTICAL + k] * R[k, 2 * n]
             else:
                 W[m, n] = constants[at.GAMMA_DT] / V * total
     pitch = B[3, 1] * wheelset_compliance[wheelset, 3, 3] * other[3, 1]
@@ -253,8 +261,8 @@ def solve_wheelset(
                 a[m] += wheelset_compliance[wheelset, m, k] * increment[k]
         x = x_free + constants[at.BETA_DT2] * a
         dx = dx_free + constants[at.GAMMA_DT] * a
-        rail_l = rail_at_end(wheelset, free_l, R_l @ f_l - before_l, constants, rail_compliance)
-        rail_r = rail_at_end(wheelset, free_r, R_r @ f_r - before_r, constants, rail_compliance)
+        rail_l = rail_at_end(wheelset, free_l, R_l @ f_l, before_l, constants, rail_compliance)
+        rail_r = rail_at_end(wheelset, free_r, R_r @ f_r, before_r, constants, rail_compliance)
         left = state_of(0, V, r0, b0, x, dx, rail_l, irregularity, rolls, table, constants)
         right = state_of(1, V, r0, b0, x, dx, rail_r, irregularity, rolls, table, constants)
         store_state(b, wheelset, 0, left, contact)

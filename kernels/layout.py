@@ -60,8 +60,11 @@ MOTION_ROWS = 8
     TABLE_ALPHA0,
     TABLE_DALPHA,
     SMEARING,  # factor on the smeared fastenings of the implicit rail blocks
+    RESIDUAL_VERTICAL,  # compliance of the modes left out, under a wheel, in w, v, theta_x; zero if not wanted
+    RESIDUAL_LATERAL,
+    RESIDUAL_TORSION,
     N_CONSTANTS,
-) = range(25)
+) = range(28)
 
 # Columns of ``clock[step, :]`` (float64): the window at t_{n+1}.
 (POSITION, SPEED, SPEED_RATE, FIRST_SEAT_S, FIRST_SEAT, FIRST_SLAB, N_CLOCK) = range(7)

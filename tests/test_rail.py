@@ -263,3 +263,17 @@ def test_static_limit_of_the_closed_form(euler: bool) -> None:
     assert abs(w0 / (P / (2.0 * BED["k"] * L)) - 1.0) < 1e-6  # shear 1e-6
     s, h = np.linspace(-12.0, 12.0, 24001, retstep=True)
     assert abs(np.sum(deflection(beam, V350, P, s)) * h * BED["k"] / P - 1.0) < 1e-4  # step 1 mm: kink squared
+
+
+def test_missing_compliance_is_the_sum_of_the_modes_left_out() -> None:
+    """Half of 1/(kGA k^2) + 1/(EI k^4) of 200 000 modes and the tail's integral; the rest is 1e-10 of it."""
+    r, modes, count = chn60(), 72, 200_000
+    missing = RailWindow(r, 36.0, modes).missing_compliance
+    k = np.arange(modes + 1, modes + count + 1) * np.pi / 36.0
+    tail = 36.0 / (np.pi * k[-1])  # integral of 1/k^2 beyond, over the spacing of the k
+    for found, stiffness, EI in zip(
+        missing, (r.kappa_vertical * r.G * r.A, r.kappa_lateral * r.G * r.A, r.GK), (r.E * r.Iy, r.E * r.Iz, np.inf),
+        strict=True,
+    ):  # fmt: skip
+        expected = (np.sum(k**-2.0) + tail) / stiffness / 36.0 + np.sum(k**-4.0) / EI / 36.0
+        assert found == pytest.approx(expected, rel=1e-6)  # the tail's midpoint rule: half a spacing of k

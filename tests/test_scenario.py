@@ -356,3 +356,13 @@ def test_unknown_kind_of_preset():
     """A programmer's slip is named as well."""
     with pytest.raises(InputError, match="did you mean 'rails'"):
         find_preset("rail", "CHN60")
+
+
+def test_start_puts_the_first_vehicle_at_a_chainage():
+    """Windows of any length see the same track; without it the window's rear end is at zero."""
+    short, long = (load_scenario("paper", ["train.start=40", f"numerics.window={window}"]) for window in (24.0, 60.0))
+    assert short.rear + short.centre_in_window == pytest.approx(40.0, abs=1e-12)
+    assert long.rear == pytest.approx(10.0, abs=1e-12)
+    assert load_scenario("paper").rear == 0.0
+    with pytest.raises(InputError, match=r"train.start = 29.0: must be at least 30 m"):
+        load_scenario("paper", ["train.start=29", "numerics.window=60.0"])

@@ -66,6 +66,7 @@ class Ingredients:
         passes: Passes a step.
         cover: Enough slabs for every seat of the window, or the paper's count.
         explicit_mortar: The bed in the explicit half.
+        local_compliance: Add the static compliance of the modes left out, under wheels and at seats.
         trains: Trains advanced together.
     """
 
@@ -85,6 +86,7 @@ class Ingredients:
     passes: int = 2
     cover: bool = True
     explicit_mortar: bool = False
+    local_compliance: bool = False
     trains: int = 1
 
     @property
@@ -236,6 +238,8 @@ def _constants(given: Ingredients, window: RailWindow) -> NDArray[np.float64]:
     c[at.IRREGULARITY_HALF_BASE], c[at.CONTACT_TOLERANCE] = HALF_BASE, CONTACT_TOLERANCE
     c[at.STATIC_LOAD] = float(np.max(static_wheel_loads(given.train)))
     c[at.SMEARING] = smearing(window, given.slab.fastening_pitch)
+    if given.local_compliance:
+        c[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1] = window.missing_compliance
     c[at.TABLE_U0], c[at.TABLE_DU] = table.u_min, table.du
     c[at.TABLE_ALPHA0], c[at.TABLE_DALPHA] = table.alpha_min, table.dalpha
     return c

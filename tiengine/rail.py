@@ -16,6 +16,7 @@ from typing import Annotated
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.special import zeta
 
 from tiengine.quantity import Params, Q
 
@@ -105,6 +106,21 @@ class RailWindow:
             ],
             axis=1,
         )
+
+    @property
+    def missing_compliance(self) -> NDArray[np.float64]:
+        """Static compliance that the modes left out would give a point under its own load, averaged over the window.
+
+        In w and v [m/N] (2/l) sum over i > N of 1/2 [1/(kappa G A k_i^2) + 1/(EI k_i^4)], in theta_x [rad/(N m)] the
+        same of 1/(GK k_i^2); the supports are soft against waves so short. Shape (3,), order w, v, theta_x.
+        """
+        r, n, half = self.rail, self.modes, self.length / 2.0
+        k1 = np.pi / self.length
+        inverse_squares, inverse_fourths = zeta(2.0, n + 1.0) / k1**2, zeta(4.0, n + 1.0) / k1**4
+        shear, bending = r.G * r.A * np.array([r.kappa_vertical, r.kappa_lateral]), r.E * np.array([r.Iy, r.Iz])
+        across = inverse_squares / shear + inverse_fourths / bending
+        missing: NDArray[np.float64] = np.append(across, inverse_squares / r.GK) / (2.0 * half)
+        return missing
 
     def vertical(self, V: float, V_rate: float = 0.0) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
         """M, C, K of (w, theta_y) at speed V [m/s] and rate V_rate [m/s^2]; each (2N, 2N)."""

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from tiengine.channels import MORTAR
 from tiengine.kernels import layout as at
-from tiengine.model import Model
 from tiengine.scenario import Scenario
 from tiengine.stepper import Chunk
+from tiengine.train import TrainModel
 from tiengine.writer import GroupSpec, TrainLabels, Writer
 
-__all__ = ["Recorder"]
+__all__ = ["Recorder", "Samples"]
 
 WHEEL_COLUMNS = {
     "normal_force": at.NORMAL_FORCE,
@@ -34,6 +34,23 @@ WHEEL_COLUMNS = {
 }
 IRREGULARITY_COLUMNS = {"vertical": at.IRREGULARITY_VERTICAL, "lateral": at.IRREGULARITY_LATERAL}
 BODY_ROWS = {"displacement": 0, "velocity": 1, "acceleration": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """What one train recorded in a chunk of steps.
+
+    Attributes:
+        wheel: Output of the wheels, see ``layout``, shape (rows, W, 2, N_WHEEL).
+        body: Displacement, velocity, acceleration of the bodies, shape (rows, 3, 5 bodies).
+        slab: Index of the slab in each slot, recorded with the bodies, shape (rows, slots).
+        pressure: Largest and smallest mortar pressure of each slab [Pa], shape (rows, slots, 2).
+    """
+
+    wheel: NDArray[np.float64]
+    body: NDArray[np.float64]
+    slab: NDArray[np.float64]
+    pressure: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -68,15 +85,14 @@ class Recorder:
             "mortar": GroupSpec.standard("mortar", tuple(MORTAR), times_of="body"),
         }
 
-    def labels(self, model: Model) -> TrainLabels:
-        """Labels of a train."""
-        train = model.given.train
+    def labels(self, train: TrainModel, slots: int) -> TrainLabels:
+        """Labels of a train over so many slabs."""
         return TrainLabels(
             vehicles=[vehicle.name for vehicle in self.scenario.parts.vehicles],
             bodies=train.body_names,
             wheelset_vehicle=train.wheelset_vehicle,
             wheelset_offset=train.wheelset_x,
-            slots=model.given.slots,
+            slots=slots,
         )
 
     def write(self, writer: Writer, chunk: Chunk, first: int, position: NDArray[np.float64]) -> None:
@@ -88,24 +104,40 @@ class Recorder:
             first: Number of the chunk's first step, counted from 1 (the state after one step).
             position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
         """
-        out = self.scenario.output
         steps = np.arange(first, first + len(position))
-        at_wheels, at_bodies = steps % self.wheel_every == 0, steps % self.body_every == 0
-        time = steps * self.dt
-        wheels, bodies = int(at_wheels.sum()), int(at_bodies.sum())
+        at_bodies = steps % self.body_every == 0
+        pressure = chunk.mortar[:, : int(at_bodies.sum())]
+        held = _slabs_held(chunk.clock[: len(position)][at_bodies, at.FIRST_SLAB], pressure.shape[2])
         for train in range(len(chunk.wheel)):
-            wheel, body = chunk.wheel[train, :wheels], chunk.body[train, :bodies]
-            samples = {name: wheel[..., WHEEL_COLUMNS[name]] for name in out.wheel_channels}
-            writer.append(train, "wheel", time[at_wheels], position[at_wheels], samples)
-            felt = {name: wheel[..., IRREGULARITY_COLUMNS[name]] for name in out.irregularity_channels}
-            writer.append(train, "irregularity", time[at_wheels], position[at_wheels], felt)
-            shape = (bodies, body.shape[-1] // 5, 5)  # a short last chunk may hold no sample of the bodies
-            motion = {name: body[:, BODY_ROWS[name]].reshape(shape) for name in out.body_channels}
-            writer.append(train, "body", time[at_bodies], position[at_bodies], motion)
-            pressure = chunk.mortar[train, :bodies]
-            held = _slabs_held(chunk.clock[: len(position)][at_bodies, at.FIRST_SLAB], pressure.shape[1])
-            bed = {"slab": held, "largest_pressure": pressure[..., 0], "smallest_pressure": pressure[..., 1]}
-            writer.append(train, "mortar", time[at_bodies], position[at_bodies], bed)
+            samples = Samples(chunk.wheel[train], chunk.body[train], held, pressure[train])
+            self.append(writer, train, samples, steps, position)
+
+    def append(
+        self, writer: Writer, train: int, samples: Samples, steps: NDArray[np.int64], position: NDArray[np.float64]
+    ) -> None:
+        """Append samples to one train of the file.
+
+        Args:
+            writer: The open file.
+            train: Its number.
+            samples: Of those steps that are recorded; rows beyond them are ignored.
+            steps: Numbers of the steps, counted from 1, shape (steps,).
+            position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
+        """
+        out, time = self.scenario.output, steps * self.dt
+        at_wheels, at_bodies = steps % self.wheel_every == 0, steps % self.body_every == 0
+        wheels, bodies = int(at_wheels.sum()), int(at_bodies.sum())
+        wheel, body = samples.wheel[:wheels], samples.body[:bodies]
+        felt = {name: wheel[..., IRREGULARITY_COLUMNS[name]] for name in out.irregularity_channels}
+        forces = {name: wheel[..., WHEEL_COLUMNS[name]] for name in out.wheel_channels}
+        writer.append(train, "wheel", time[at_wheels], position[at_wheels], forces)
+        writer.append(train, "irregularity", time[at_wheels], position[at_wheels], felt)
+        shape = (bodies, body.shape[-1] // 5, 5)  # a short last chunk may hold no sample of the bodies
+        motion = {name: body[:, BODY_ROWS[name]].reshape(shape) for name in out.body_channels}
+        writer.append(train, "body", time[at_bodies], position[at_bodies], motion)
+        largest, smallest = samples.pressure[:bodies, :, 0], samples.pressure[:bodies, :, 1]
+        bed = {"slab": samples.slab[:bodies], "largest_pressure": largest, "smallest_pressure": smallest}
+        writer.append(train, "mortar", time[at_bodies], position[at_bodies], bed)
 
     def _steps(self, interval: float | str) -> int:
         return 1 if isinstance(interval, str) else max(1, round(interval / self.dt))

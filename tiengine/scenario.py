@@ -87,12 +87,16 @@ def _channels(known: dict[str, Any]) -> BeforeValidator:
 
 
 class Train(Params):
-    """What runs and how fast."""
+    """What runs and how fast.
+
+    ``start`` is the chainage of the first vehicle's centre at t = 0; "auto" puts the window's rear end at zero.
+    """
 
     vehicles: Annotated[tuple[Part, ...], Field(min_length=1)]
     coupler_pitch: float | tuple[float, ...] | None = Field(None, json_schema_extra={"unit": "m"})
     speed_kmh: Annotated[float | tuple[tuple[float, float], ...], BeforeValidator(_check_speed)]
     distance: Annotated[float, Q("m", "way of the train", gt=0, le=1e6)]
+    start: Annotated[float | Literal["auto"], _number_or("auto", "m", 0.0, 1e7)] = "auto"
     wheel_profile: Part = "LMA"
     series_springs: bool = False
 
@@ -137,6 +141,7 @@ class Numerics(Params):
     passes: Annotated[int, Q("-", "passes of the explicit half per step", ge=1, le=20)] = 2
     start: Literal["equilibrium", "zero"] = "equilibrium"
     mortar: Literal["implicit", "explicit"] = "implicit"
+    truncation: Literal["none", "local"] = "none"
     slab_count: Literal["cover", "paper"] = "cover"
     threads: Annotated[int, Q("-", "of Taichi's loop over trains; one train alone runs on one", ge=1, le=1024)] = 1
 
@@ -199,6 +204,19 @@ class Scenario(Params):
         if self.numerics.window != "auto":
             return float(self.numerics.window)
         return self.parts.wheel_span + 2.0 * WINDOW_MARGIN
+
+    @cached_property
+    def rear(self) -> float:
+        """Chainage of the window's rear end at t = 0 [m]."""
+        if self.train.start == "auto":
+            return 0.0
+        return float(self.train.start) - self.centre_in_window
+
+    @cached_property
+    def centre_in_window(self) -> float:
+        """Centre of the first vehicle from the window's rear end [m]: the wheels stand in its middle."""
+        x = self.parts.wheelset_positions
+        return self.window_length / 2.0 - 0.5 * float(x.max() + x.min())
 
     @cached_property
     def modes(self) -> int:
@@ -267,13 +285,18 @@ def _check(scenario: Scenario) -> None:
             f"numerics.window = {window:g}: window shorter than the train; must be at least {least:g} m"
             f" (wheels over {parts.wheel_span:g} m and {WINDOW_MARGIN_LEAST:g} m at either end)"
         )
+    if scenario.rear < 0.0:
+        raise InputError(
+            f"train.start = {scenario.train.start}: must be at least {scenario.centre_in_window:g} m,"
+            " where the window begins at chainage zero"
+        )
     step = scenario.numerics.time_step
     if step != "auto":
         check_wavelength(scenario, float(step))
     check_defects(
         scenario.track.failed_fastenings,
         scenario.track.mortar_voids,
-        end=scenario.train.distance + window,
+        end=scenario.rear + scenario.train.distance + window,
         slab=parts.slab,
     )
 

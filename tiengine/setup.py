@@ -47,6 +47,7 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         newmark=Newmark(dt),
         passes=numerics.passes,
         cover=numerics.slab_count == "cover",
+        local_compliance=numerics.truncation == "local",
         explicit_mortar=numerics.mortar == "explicit",
     )
 

@@ -89,7 +89,7 @@ def prepare(scenario: Scenario, public_launch: bool = False) -> tuple[Model, flo
     """
     backend.start(scenario.numerics.threads)
     asked = scenario.numerics.time_step
-    V = scenario.train.speed.at(0.0)[0]
+    V = scenario.train.speed.at(scenario.rear + scenario.centre_in_window)[0]
     fastest = scenario.train.speed.fastest
     jit = 0.0
     track = make_irregularity(scenario.irregularity, 0.0)  # a measured series has its own shortest wave
@@ -123,22 +123,22 @@ def _run(scenario: Scenario, path: Path | None, force: bool, progress: Progress 
     recorder = Recorder(scenario, dt)
     speed = scenario.train.speed
     state = State.at_rest(model)
-    V, V_rate = speed.at(model.centre_s)
+    V, V_rate = speed.at(scenario.rear + model.centre_s)
     if scenario.numerics.start == "equilibrium":
-        equilibrium(model, state, 0.0, V, V_rate)
+        equilibrium(model, state, scenario.rear, V, V_rate)
     else:
-        release(model, state, 0.0)
+        release(model, state, scenario.rear)
     rows = (CHUNK_STEPS // every + 1 for every in (recorder.wheel_every, recorder.body_every))
     chunk = Chunk.empty(model, CHUNK_STEPS, *rows)
-    irregularity = make_irregularity(scenario.irregularity, float(model.wheel_s.max()))
+    irregularity = make_irregularity(scenario.irregularity, scenario.rear + float(model.wheel_s.max()))
     stepper = Stepper(model, state, chunk, public=public)
     jit += stepper.compile()
     setup = time.perf_counter() - started - jit
     times = {"import": IMPORT_SECONDS, "jit": jit, "setup": setup}
     attributes = {**_facts(scenario, model), "status": "running"}
+    labels = recorder.labels(model.given.train, model.given.slots)
     with Writer(
-        path, to_toml(scenario), attributes, [recorder.labels(model)], recorder.groups(), scenario.output.precision,
-        force=force,
+        path, to_toml(scenario), attributes, [labels], recorder.groups(), scenario.output.precision, force=force
     ) as writer:  # fmt: skip
         return _loop(scenario, model, stepper, irregularity, recorder, writer, progress, times)
 
@@ -155,10 +155,11 @@ def _loop(
 ) -> Result:
     """March chunk by chunk to the end of the way, then close the file."""
     dt, chunk = model.given.newmark.dt, stepper.chunk
-    end = model.centre_s + scenario.train.distance
+    first = scenario.rear + model.centre_s
+    end = first + scenario.train.distance
     speed = scenario.train.speed
-    duration = _duration(speed, model.centre_s, scenario.train.distance)
-    position, done, writing = model.centre_s, 0, 0.0
+    duration = _duration(speed, first, scenario.train.distance)
+    position, done, writing = first, 0, 0.0
     started = time.perf_counter()
     failure = None
     while position < end - 1e-9 and failure is None:

@@ -61,6 +61,11 @@ class StaticTrack:
         q = la.lu_solve(self._lu, self._place).reshape(2, 5, n, -1)
         fields = q[:, [0, 2, 4]]
         value, slope = (np.einsum("wn,rfnk->wrfk", shape[kind], fields) for kind in (0, 1))
+        wheels = np.arange(W)[:, None], np.arange(2)
+        value = np.ascontiguousarray(value)  # what follows changes it in place
+        missing = value.reshape(W, 2, 3, W, 2, 3)
+        for m, compliance in enumerate(model.constants[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1]):
+            missing[(*wheels, m, *wheels, m)] += compliance  # of the modes left out: a wheel feels its own force only
         self._compliance = np.concatenate([value, slope, np.zeros_like(value)], axis=2)
 
     def under_wheels(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
