@@ -7,8 +7,10 @@ from pathlib import Path
 
 import click
 from rich.console import Console
+from rich.progress import Progress
 
 from tiengine import backend
+from tiengine.scenario import load_scenario
 from validation.case import Outcome, evaluate
 from validation.table import insert, markdown, show
 
@@ -56,6 +58,37 @@ def figure(output: Path) -> None:
     output.parent.mkdir(parents=True, exist_ok=True)
     draw(output)
     click.echo(f"wrote {output}")
+
+
+@main.command()
+@click.argument("scenario")
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Result file.")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key: train.speed_kmh=300")
+@click.option("--length", default=600.0, show_default=True, help="Rail [m].")
+@click.option("--modes-per-metre", default=2.0, show_default=True, help="Trial functions a field and metre.")
+@click.option("--slab-modes", default=20, show_default=True, help="Free-free plate modes a slab.")
+@click.option("--time-step", default=2e-4, show_default=True, help="dt [s].")
+@click.option("--force", is_flag=True, help="Replace an existing result file.")
+def msm(
+    scenario: str, output: Path, settings: tuple[str, ...], length: float, modes_per_metre: float, slab_modes: int,
+    time_step: float, force: bool,
+) -> None:  # fmt: skip
+    """Run SCENARIO in the traditional full-length model and write the engine's HDF5 layout."""
+    from validation.msm.simulate import FullLength, run_full_length
+
+    console = Console(stderr=True)
+    resolved = load_scenario(scenario, settings)
+    numerics = FullLength(length, modes_per_metre, slab_modes, time_step)
+    with Progress(console=console) as bar:
+        task = bar.add_task(resolved.name, total=1.0)
+        with run_full_length(
+            resolved, numerics, output, force=force, progress=lambda now, end: bar.update(task, completed=now / end)
+        ) as result:
+            facts = result.attributes
+    console.print(
+        f"{facts['dofs']} DOFs, {facts['steps']} steps, {1e3 * facts['wall_time_loop'] / facts['steps']:.2f} ms a step,"
+        f" {facts['real_time_factor']:.1f} s per simulated second; wrote {output}"
+    )
 
 
 if __name__ == "__main__":

@@ -1,0 +1,1 @@
+"""The traditional full-length model (Zhai's modal superposition), the yardstick of the moving window."""

@@ -1,0 +1,186 @@
+"""Run a scenario in the full-length model and write the engine's HDF5 layout."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from tiengine import backend
+from tiengine.irregularity import Irregularity, make_irregularity
+from tiengine.quantity import InputError
+from tiengine.recorder import Recorder, Samples
+from tiengine.results import Result
+from tiengine.scenario import Scenario, load_scenario, to_toml
+from tiengine.setup import ingredients
+from tiengine.simulate import Progress
+from tiengine.writer import Writer
+from validation.msm.model import FullTrack, build_track
+from validation.msm.start import steady_rolling
+from validation.msm.step import Buffers, FullState, FullStepper
+
+__all__ = ["FullLength", "run_full_length"]
+
+CHUNK_STEPS = 1000
+END_MARGIN = 10.0
+"""Wheels are compared while this far from the rail's ends [m]."""
+
+
+@dataclass(frozen=True)
+class FullLength:
+    """Numerics of the full-length model.
+
+    Attributes:
+        length: Rail [m], taken to whole seats.
+        modes_per_metre: Trial functions a field and metre.
+        slab_modes: Free-free plate modes a slab.
+        time_step: dt [s].
+    """
+
+    length: float = 600.0
+    modes_per_metre: float = 2.0
+    slab_modes: int = 20
+    time_step: float = 2e-4
+
+
+def run_full_length(
+    scenario: Scenario | str,
+    numerics: FullLength | None = None,
+    output: Path | None = None,
+    *,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Result:
+    """Simulate a scenario with whole rails and all slabs.
+
+    Args:
+        scenario: What runs over which track; its window and modes do not matter here.
+        numerics: Length, modes and step.
+        output: HDF5 file; in memory if None.
+        force: Replace an existing file.
+        progress: Called with simulated time and end time [s] now and then.
+
+    Returns:
+        The result, open for reading; the run ends before a wheel comes within 10 m of the rail's end.
+
+    Raises:
+        InputError: What the traditional model has not: changing speed, a start from zero, mortar that does not pull.
+    """
+    scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    numerics = numerics or FullLength()
+    if not scenario.train.speed.is_constant:
+        raise InputError("train.speed_kmh: must be one number in the full-length model")
+    if scenario.numerics.start != "equilibrium":
+        raise InputError('numerics.start = "zero": must be "equilibrium" in the full-length model')
+    with threadpool_limits(1):
+        return _run(scenario, numerics, output, force, progress)
+
+
+def _run(
+    scenario: Scenario, numerics: FullLength, output: Path | None, force: bool, progress: Progress | None
+) -> Result:
+    clock = time.perf_counter()
+    backend.start(1)
+    V = scenario.train.speed.fastest
+    dt = numerics.time_step
+    given = ingredients(scenario, dt)
+    track = build_track(scenario, given, numerics.length, numerics.modes_per_metre, numerics.slab_modes)
+    state = FullState.at_rest(track)
+    steady_rolling(track, state, scenario, given, V)
+    recorder = Recorder(scenario, dt)
+    rows = (CHUNK_STEPS // every + 1 for every in (recorder.wheel_every, recorder.body_every))
+    buffers = Buffers.empty(track, CHUNK_STEPS, *rows)
+    stepper = FullStepper(track, state, buffers, V)
+    start = scenario.rear + scenario.centre_in_window
+    irregularity = make_irregularity(scenario.irregularity, start + float(given.train.wheelset_x.max()))
+    attributes: dict[str, Any] = {
+        **{f"dofs_{name}": count for name, count in track.dof_counts.items() if name != "total"},
+        "dofs": track.dof_counts["total"],
+        "method": "full length",
+        "rail_length": track.rail_length,
+        "modes": track.modes,
+        "slabs": track.slabs,
+        "time_step": dt,
+        "passes": track.passes,
+        "seed": scenario.irregularity.seed,
+        "status": "running",
+        "wall_time_setup": time.perf_counter() - clock,
+    }
+    labels = recorder.labels(track.train, track.slabs)
+    with Writer(
+        output, to_toml(scenario), attributes, [labels], recorder.groups(), scenario.output.precision, force=force
+    ) as writer:  # fmt: skip
+        return _loop(scenario, stepper, irregularity, recorder, writer, progress, start)
+
+
+def _loop(
+    scenario: Scenario,
+    stepper: FullStepper,
+    irregularity: Irregularity,
+    recorder: Recorder,
+    writer: Writer,
+    progress: Progress | None,
+    start: float,
+) -> Result:
+    """March to the end of the way or of the rail."""
+    track, buffers = stepper.track, stepper.buffers
+    x, dt = track.train.wheelset_x, track.newmark.dt
+    end = min(start + scenario.train.distance, track.rear + track.rail_length - END_MARGIN - float(x.max()))
+    speed, position, done, writing = scenario.train.speed, start, 0, 0.0
+    duration = (end - start) / speed.fastest
+    clock = time.perf_counter()
+    while position < end - 1e-9:
+        chainage, V, V_rate = speed.advance(position, dt, CHUNK_STEPS)
+        count = min(int(np.searchsorted(chainage, end - 1e-9)), CHUNK_STEPS)
+        chainage, V, V_rate = chainage[1 : count + 1], V[1 : count + 1], V_rate[1 : count + 1]
+        buffers.clock[:count, :3] = np.stack([chainage, V, V_rate], axis=1)
+        buffers.irregularity[0, :count] = irregularity.sample(chainage[:, None] + x)
+        _advance(stepper, recorder, done, count)
+        if not np.isfinite(stepper.state.force).all():
+            raise RuntimeError(f"the full-length model ran away before {chainage[-1]:.1f} m; shorten the time step")
+        before = time.perf_counter()
+        steps = np.arange(done + 1, done + count + 1)
+        recorder.append(writer, 0, _samples(track, buffers), steps, chainage)
+        writing += time.perf_counter() - before
+        done, position = done + count, float(chainage[-1])
+        if progress is not None:
+            progress(done * dt, max(duration, done * dt))
+    loop = time.perf_counter() - clock
+    return writer.close(
+        {
+            "status": "complete",
+            "simulated_time": done * dt,
+            "steps": done,
+            "wall_time_loop": loop,
+            "wall_time_writing": writing,
+            "real_time_factor": loop / (done * dt),
+        }
+    )
+
+
+def _advance(stepper: FullStepper, recorder: Recorder, done: int, count: int) -> None:
+    """The steps of one chunk."""
+    wheel_row = body_row = 0
+    for i in range(count):
+        k = done + i + 1
+        wheels, bodies = k % recorder.wheel_every == 0, k % recorder.body_every == 0
+        stepper.step(i, wheel_row if wheels else -1, body_row if bodies else -1)
+        wheel_row += wheels
+        body_row += bodies
+
+
+def _samples(track: FullTrack, buffers: Buffers) -> Samples:
+    """The chunk as the recorder wants it; pressures with the slabs' dead weight."""
+    u, v = buffers.slabs[:, 0, :, : track.slab_modes], buffers.slabs[:, 1, :, : track.slab_modes]
+    pressure = np.empty((*u.shape[:2], 2))
+    for group in track.groups:
+        slab = group.slab
+        here = (track.mortar.stiffness * u[:, group.index] + track.mortar.damping * v[:, group.index]) @ slab.bed
+        here = slab.bed_factor * (track.dead_pressure + here)
+        pressure[:, group.index, 0], pressure[:, group.index, 1] = here.max(axis=2), here.min(axis=2)
+    index = np.broadcast_to(track.first_slab + np.arange(float(track.slabs)), u.shape[:2])
+    return Samples(buffers.wheel[0], buffers.body[0], index, pressure)
