@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["Case", "Outcome", "evaluate"]
 
 Reals = NDArray[np.float64]
-Kind = Literal["verification", "validation", "convergence", "information"]
+Kind = Literal["verification", "validation", "full length", "convergence", "information"]
 Verdict = Literal["ok", "MISS", "for information", "left out"]
 
 
@@ -24,8 +24,8 @@ class Case:
     Attributes:
         name: Unique; ``--only`` takes it or its beginning.
         kind: ``verification`` against a closed form, ``validation`` against others' numbers,
-            ``convergence`` against
-            ourselves at a finer step or mesh, ``information`` without a judgement.
+            ``full length`` against the traditional model, ``convergence`` against ourselves at a finer step or mesh,
+            ``information`` without a judgement.
         quantity: What is compared, with its unit.
         source: Where the reference comes from.
         reference: The number or numbers; computed if it is a closed form.

@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.results import Result
 from tiengine.scenario import load_scenario
 from tiengine.simulate import run
+from validation.msm.simulate import FullLength, run_full_length
 
-__all__ = ["Forces", "simulate"]
+__all__ = ["Forces", "full_length", "simulate"]
 
 Reals = NDArray[np.float64]
+DOUBLE = 'output.precision="double"'
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +52,25 @@ def simulate(scenario: str, *overrides: str, public: bool = False) -> Forces:
         overrides: ``"train.speed_kmh=300"`` and the like.
         public: Public Taichi calls only.
     """
-    with run(load_scenario(scenario, ['output.precision="double"', *overrides]), public_launch=public) as result:
-        wheel, facts = result.wheel(), result.attributes
+    with run(load_scenario(scenario, [DOUBLE, *overrides]), public_launch=public) as result:
+        return _forces(result)
+
+
+@cache
+def full_length(scenario: str, numerics: FullLength, *overrides: str) -> Forces:
+    """Run a built-in scenario with changes in the traditional full-length model, in double precision.
+
+    Args:
+        scenario: Its name.
+        numerics: Rail, modes, step.
+        overrides: ``"train.speed_kmh=300"`` and the like.
+    """
+    with run_full_length(load_scenario(scenario, [DOUBLE, *overrides]), numerics) as result:
+        return _forces(result)
+
+
+def _forces(result: Result) -> Forces:
+    wheel = result.wheel()
     return Forces(
         time=wheel["time"],
         position=wheel["position"],
@@ -58,5 +78,5 @@ def simulate(scenario: str, *overrides: str, public: bool = False) -> Forces:
         vertical=wheel["vertical_force"],
         lateral=wheel["lateral_force"],
         creep=wheel["lateral_creep_force"],
-        facts=facts,
+        facts=result.attributes,
     )

@@ -20,6 +20,7 @@ BEGIN, END = "<!-- verification -->", "<!-- /verification -->"
 TITLES = {
     "verification": "Against closed forms",
     "validation": "Against other people's numbers",
+    "full length": "Against the traditional full-length model",
     "convergence": "Against ourselves, finer",
     "information": "For information",
 }

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine import backend
@@ -23,7 +24,9 @@ from validation.msm.model import FullTrack, build_track
 from validation.msm.start import steady_rolling
 from validation.msm.step import Buffers, FullState, FullStepper
 
-__all__ = ["FullLength", "run_full_length"]
+__all__ = ["FullLength", "load", "prepare", "run_full_length"]
+
+Reals = NDArray[np.float64]
 
 CHUNK_STEPS = 1000
 END_MARGIN = 10.0
@@ -72,31 +75,55 @@ def run_full_length(
     """
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     numerics = numerics or FullLength()
+    with threadpool_limits(1):
+        return _run(scenario, numerics, output, force, progress)
+
+
+def prepare(scenario: Scenario, numerics: FullLength, steps: int, wheel_rows: int, body_rows: int) -> FullStepper:
+    """Build the track, put the train into steady rolling, bind the kernels to buffers of so many steps and rows."""
     if not scenario.train.speed.is_constant:
         raise InputError("train.speed_kmh: must be one number in the full-length model")
     if scenario.numerics.start != "equilibrium":
         raise InputError('numerics.start = "zero": must be "equilibrium" in the full-length model')
-    with threadpool_limits(1):
-        return _run(scenario, numerics, output, force, progress)
+    backend.start(1)
+    V = scenario.train.speed.fastest
+    given = ingredients(scenario, numerics.time_step)
+    track = build_track(scenario, given, numerics.length, numerics.modes_per_metre, numerics.slab_modes)
+    state = FullState.at_rest(track)
+    steady_rolling(track, state, scenario, given, V)
+    return FullStepper(track, state, Buffers.empty(track, steps, wheel_rows, body_rows), V)
+
+
+def load(stepper: FullStepper, scenario: Scenario, irregularity: Irregularity, position: float, end: float) -> Reals:
+    """Fill the stepper's buffers for the coming steps.
+
+    Args:
+        stepper: Says how many steps fit.
+        scenario: Gives the speed.
+        irregularity: The track.
+        position: Chainage of the first vehicle's centre now [m].
+        end: Chainage where the run ends [m].
+
+    Returns:
+        Chainage at the end of each step [m], shape (steps,).
+    """
+    track, buffers = stepper.track, stepper.buffers
+    chainage, V, V_rate = scenario.train.speed.advance(position, track.newmark.dt, len(buffers.clock))
+    count = min(int(np.searchsorted(chainage, end - 1e-9)), len(buffers.clock))
+    chainage, V, V_rate = chainage[1 : count + 1], V[1 : count + 1], V_rate[1 : count + 1]
+    buffers.clock[:count, :3] = np.stack([chainage, V, V_rate], axis=1)
+    buffers.irregularity[0, :count] = irregularity.sample(chainage[:, None] + track.train.wheelset_x)
+    return chainage
 
 
 def _run(
     scenario: Scenario, numerics: FullLength, output: Path | None, force: bool, progress: Progress | None
 ) -> Result:
     clock = time.perf_counter()
-    backend.start(1)
-    V = scenario.train.speed.fastest
-    dt = numerics.time_step
-    given = ingredients(scenario, dt)
-    track = build_track(scenario, given, numerics.length, numerics.modes_per_metre, numerics.slab_modes)
-    state = FullState.at_rest(track)
-    steady_rolling(track, state, scenario, given, V)
-    recorder = Recorder(scenario, dt)
+    recorder = Recorder(scenario, numerics.time_step)
     rows = (CHUNK_STEPS // every + 1 for every in (recorder.wheel_every, recorder.body_every))
-    buffers = Buffers.empty(track, CHUNK_STEPS, *rows)
-    stepper = FullStepper(track, state, buffers, V)
-    start = scenario.rear + scenario.centre_in_window
-    irregularity = make_irregularity(scenario.irregularity, start + float(given.train.wheelset_x.max()))
+    stepper = prepare(scenario, numerics, CHUNK_STEPS, *rows)
+    track = stepper.track
     attributes: dict[str, Any] = {
         **{f"dofs_{name}": count for name, count in track.dof_counts.items() if name != "total"},
         "dofs": track.dof_counts["total"],
@@ -104,7 +131,7 @@ def _run(
         "rail_length": track.rail_length,
         "modes": track.modes,
         "slabs": track.slabs,
-        "time_step": dt,
+        "time_step": numerics.time_step,
         "passes": track.passes,
         "seed": scenario.irregularity.seed,
         "status": "running",
@@ -114,37 +141,28 @@ def _run(
     with Writer(
         output, to_toml(scenario), attributes, [labels], recorder.groups(), scenario.output.precision, force=force
     ) as writer:  # fmt: skip
-        return _loop(scenario, stepper, irregularity, recorder, writer, progress, start)
+        return _loop(scenario, stepper, recorder, writer, progress)
 
 
 def _loop(
-    scenario: Scenario,
-    stepper: FullStepper,
-    irregularity: Irregularity,
-    recorder: Recorder,
-    writer: Writer,
-    progress: Progress | None,
-    start: float,
+    scenario: Scenario, stepper: FullStepper, recorder: Recorder, writer: Writer, progress: Progress | None
 ) -> Result:
     """March to the end of the way or of the rail."""
-    track, buffers = stepper.track, stepper.buffers
-    x, dt = track.train.wheelset_x, track.newmark.dt
-    end = min(start + scenario.train.distance, track.rear + track.rail_length - END_MARGIN - float(x.max()))
-    speed, position, done, writing = scenario.train.speed, start, 0, 0.0
-    duration = (end - start) / speed.fastest
+    track, buffers, dt = stepper.track, stepper.buffers, stepper.track.newmark.dt
+    front = float(track.train.wheelset_x.max())
+    position = start = scenario.rear + scenario.centre_in_window
+    irregularity = make_irregularity(scenario.irregularity, start + front)
+    end = min(start + scenario.train.distance, track.rear + track.rail_length - END_MARGIN - front)
+    duration, done, writing = (end - start) / scenario.train.speed.fastest, 0, 0.0
     clock = time.perf_counter()
     while position < end - 1e-9:
-        chainage, V, V_rate = speed.advance(position, dt, CHUNK_STEPS)
-        count = min(int(np.searchsorted(chainage, end - 1e-9)), CHUNK_STEPS)
-        chainage, V, V_rate = chainage[1 : count + 1], V[1 : count + 1], V_rate[1 : count + 1]
-        buffers.clock[:count, :3] = np.stack([chainage, V, V_rate], axis=1)
-        buffers.irregularity[0, :count] = irregularity.sample(chainage[:, None] + x)
+        chainage = load(stepper, scenario, irregularity, position, end)
+        count = len(chainage)
         _advance(stepper, recorder, done, count)
         if not np.isfinite(stepper.state.force).all():
             raise RuntimeError(f"the full-length model ran away before {chainage[-1]:.1f} m; shorten the time step")
         before = time.perf_counter()
-        steps = np.arange(done + 1, done + count + 1)
-        recorder.append(writer, 0, _samples(track, buffers), steps, chainage)
+        recorder.append(writer, 0, _samples(track, buffers), np.arange(done + 1, done + count + 1), chainage)
         writing += time.perf_counter() - before
         done, position = done + count, float(chainage[-1])
         if progress is not None:
