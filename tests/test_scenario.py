@@ -271,11 +271,11 @@ def test_wavelength_limit_is_eight_steps():
 
 
 def test_train_of_three():
-    """Couplings at the vehicles' length by default; wheels span 2 x 25 + 20 m, the window 16 m more."""
+    """Couplings at the vehicles' length by default; wheels span 2 x 25 + 20 m, the window 8 m more."""
     scenario = load_scenario("train3")
     np.testing.assert_array_equal(scenario.parts.centres, [0.0, -25.0, -50.0])
     assert scenario.parts.wheel_span == 70.0
-    assert scenario.window_length == 86.0
+    assert scenario.window_length == 78.0
     assert (np.diff(scenario.parts.wheelset_positions) < 0.0).all()
     wide = load_scenario("train3", ["train.coupler_pitch=[26.0, 30.0]"])
     np.testing.assert_array_equal(wide.parts.centres, [0.0, -26.0, -56.0])

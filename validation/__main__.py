@@ -1,4 +1,4 @@
-"""Command line: ``python -m validation``, ``python -m validation figure``."""
+"""Command line: ``python -m validation`` and its commands."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from rich.progress import Progress
 from tiengine import backend
 from tiengine.scenario import load_scenario
 from validation.case import Outcome, evaluate
-from validation.table import insert, markdown, show
+from validation.table import headlines, insert, markdown, show
 
 ROOT = Path(__file__).resolve().parents[1]
 REPORT = ROOT / "validation" / "report" / "verification.md"
-FIGURE = ROOT / "docs" / "images" / "paper_case.png"
 
 
 @click.group(invoke_without_command=True)
@@ -28,7 +27,7 @@ def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool
     """Hold the engine to closed forms, others' numbers and its own convergence; status 1 on a miss."""
     if context.invoked_subcommand is not None:
         return
-    from validation.catalogue import CASES
+    from validation.catalogue import CASES, HEADLINES
 
     chosen = [case for case in CASES if (case.quick or not quick) and (not only or case.name.startswith(only))]
     if not chosen:
@@ -42,22 +41,43 @@ def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool
         console.print(f"{last.verdict:16} {case.name}  {last.seconds:.1f} s", highlight=False)
     show(outcomes, console)
     if write:
-        text = markdown(outcomes)
         REPORT.parent.mkdir(exist_ok=True)
-        REPORT.write_text(f"# Verification\n\n{text}", encoding="utf-8")
-        insert(text, ROOT / "README.md")
+        REPORT.write_text(f"# Verification\n\n{markdown(outcomes)}", encoding="utf-8")
+        insert(headlines(outcomes, HEADLINES), ROOT / "README.md")
     sys.exit(any(outcome.verdict == "MISS" for outcome in outcomes))
 
 
 @main.command()
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=FIGURE, show_default=True)
-def figure(output: Path) -> None:
-    """Run the paper's case and draw the forces of its first wheelset."""
-    from validation.figure import draw
+def figures() -> None:
+    """Draw the report's smaller figures: conicity, periodic supports, spectrum of the wheel force."""
+    from validation import contact_geometry, periodic_support_figure, wheel_spectrum
 
-    output.parent.mkdir(parents=True, exist_ok=True)
-    draw(output)
-    click.echo(f"wrote {output}")
+    backend.start()
+    for name, module in (
+        ("conicity", contact_geometry),
+        ("periodic_support", periodic_support_figure),
+        ("spectrum", wheel_spectrum),
+    ):
+        module.draw(REPORT.parent / f"{name}.png")
+        click.echo(f"wrote {name}.png")
+
+
+@main.command()
+def convergence() -> None:
+    """Refine step, modes, slab mesh and window; table and figures go to validation/report (7 min)."""
+    from validation.convergence_report import write
+
+    backend.start()
+    write(REPORT.parent)
+
+
+@main.command()
+def paper() -> None:
+    """Compare window and full length on the paper's case; tables and figures go to validation/report (half an hour)."""
+    from validation.paper_report import write
+
+    page = write(REPORT.parent)
+    click.echo(f"wrote {page}")
 
 
 @main.command()

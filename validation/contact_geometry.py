@@ -12,6 +12,8 @@ contact, where 0.25 mm samples decide (S1002 beyond 4 mm and, on 60E1, at 1 mm).
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,8 @@ from tiengine.conicity import equivalent_conicity, rolling_radius_difference, wh
 from tiengine.contact_geometry import ContactSettings, WheelRailPair
 from tiengine.profile import load_profile
 from validation.case import Case
+
+__all__ = ["CASES", "draw"]
 
 Reals = NDArray[np.float64]
 INDEPENDENT = "independent calculation"
@@ -63,6 +67,37 @@ def _sampled(wheel: str, rail: str, settings: dict[str, float]) -> Reals:
     t = (np.arange(4000) + 0.5) * np.pi / 8000.0
     sine = np.sin(t)
     return np.array([(np.interp(A * sine, y, difference) * sine).mean() / A for A in AMPLITUDES])
+
+
+def draw(path: Path) -> None:
+    """Equivalent conicity over amplitude, 1 to 8 mm, of the four pairs; the references as marks.
+
+    Args:
+        path: PNG to write.
+    """
+    import matplotlib as mpl  # here: the table does not need it
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    colours = ("#0072B2", "#56B4E9", "#D55E00", "#CC79A7")  # of Okabe and Ito, told apart by any eye
+    fine = np.linspace(1.0, 8.0, 141) * 1e-3
+    figure, axis = plt.subplots(figsize=(7.5, 4.5), layout="constrained")
+    for (wheel, rail, settings, printed, _), colour, mark in zip(PAIRS, colours, "osD^", strict=True):
+        curve = equivalent_conicity(_pair(wheel, rail, settings), fine)
+        axis.plot(1e3 * fine, curve, color=colour, linewidth=1.2)
+        axis.plot(1e3 * AMPLITUDES, printed, mark, color=colour, markerfacecolor="none", label=f"{wheel} on {rail}")
+    axis.plot(3.0, 0.18, "*", color="black", markersize=12, label="EN 15302: S1002 on 60E1")
+    axis.set_yscale("log")
+    axis.set_yticks([0.02, 0.05, 0.1, 0.2, 0.5, 1.0], ["0.02", "0.05", "0.1", "0.2", "0.5", "1"])
+    axis.set_xlabel("amplitude of the wheelset's lateral motion [mm]")
+    axis.set_ylabel("equivalent conicity [-]")
+    axis.set_title("Curves: tiengine; marks: references (samples of 0.25 mm)", loc="left", fontsize=10)
+    axis.grid(color="0.9")
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.legend(frameon=False, fontsize=9)
+    figure.savefig(path, dpi=160)
+    plt.close(figure)
 
 
 _JUMPY = np.tile([1.0, 1.0, 2.0, 2.0], 2)  # at 6 and 8 mm a shift of 1 um moves the contact by 3 to 12 um

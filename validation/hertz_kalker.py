@@ -4,20 +4,25 @@ References: the classical table of Hertz's coefficients m, n, r over cos(beta) =
 recomputed with elliptic integrals by an independent calculation; the same calculation's numbers for a
 wheel of 0.43 m under 70 kN; J. J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990),
 table E3, as coded in CONTACT (Apache-2.0), src/m_hertz.f90; Z. Y. Shen, J. K. Hedrick, J. A. Elkins,
-8th IAVSD (1983) 591-605.
+8th IAVSD (1983) 591-605; CONTACT's reference output of the Manchester benchmark (see ``manchester``), of
+which its normal forces and creepages are taken here and its tangential forces compared.
 """
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.contact_search import transverse_curvature
 from tiengine.hertz import hertz, zhai_G
 from tiengine.kalker import kalker
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
 from tiengine.start import evaluate_contact
 from validation.case import Case
+from validation.manchester import CONTACT, R0, REFERENCE, placed
 from validation.models import paper_model
 
 Reals = NDArray[np.float64]
@@ -52,6 +57,44 @@ LONG = (  # nu = 0.25, b/a = RATIOS
     (14.6, 6.63, 4.32, 3.24, 2.62, 2.23, 1.95, 1.75, 1.59, 1.47),
     (0.526, 0.601, 0.674, 0.747, 0.819, 0.892, 0.965, 1.04, 1.11, 1.19),
 )
+
+
+CREEP = np.stack([REFERENCE["Fx"], REFERENCE["Fs"]], axis=1) / (0.3 * REFERENCE["Fn"][:, None])
+"""CONTACT's creep forces along and across over mu N."""
+FLANK = 13  # first of its rows on the flank
+FULL_THEORY = f"{CONTACT}, full theory, its normal forces and creepages given"
+SHEN = "a Hertzian ellipse, linear coefficients and one saturation for all creepages: 10 % of mu N is usual"
+TABLE = {  # nu = 0 and 0.5: rows as above
+    0.0: (
+        (
+            (2.51, 2.59, 2.68, 2.78, 2.88, 2.98, 3.09, 3.19, 3.29, 3.40),
+            (2.51, 2.59, 2.68, 2.78, 2.88, 2.98, 3.09, 3.19, 3.29, 3.40),
+            (0.334, 0.483, 0.607, 0.720, 0.827, 0.930, 1.03, 1.13, 1.23, 1.33),
+            (6.42, 3.46, 2.49, 2.02, 1.74, 1.56, 1.43, 1.34, 1.27, 1.21),
+        ),
+        (
+            (10.7, 6.96, 5.57, 4.84, 4.37, 4.06, 3.82, 3.65, 3.51, 3.40),
+            (10.7, 6.96, 5.57, 4.84, 4.37, 4.06, 3.82, 3.65, 3.51, 3.40),
+            (12.2, 5.72, 3.79, 2.88, 2.35, 2.01, 1.76, 1.58, 1.44, 1.33),
+            (0.795, 0.828, 0.868, 0.912, 0.958, 1.01, 1.05, 1.10, 1.16, 1.21),
+        ),
+    ),
+    0.25: (NARROW, LONG),
+    0.5: (
+        (
+            (4.85, 4.81, 4.80, 4.82, 4.83, 4.91, 4.97, 5.05, 5.12, 5.20),
+            (2.53, 2.66, 2.81, 2.98, 3.14, 3.31, 3.48, 3.65, 3.82, 3.98),
+            (0.731, 0.809, 0.889, 0.977, 1.07, 1.18, 1.29, 1.40, 1.51, 1.63),
+            (11.7, 5.66, 3.72, 2.77, 2.22, 1.86, 1.60, 1.42, 1.27, 1.16),
+        ),
+        (
+            (12.9, 8.82, 7.34, 6.57, 6.11, 5.80, 5.58, 5.42, 5.30, 5.20),
+            (16.0, 9.79, 7.51, 6.31, 5.56, 5.04, 4.67, 4.39, 4.16, 3.98),
+            (18.0, 7.89, 5.01, 3.70, 2.96, 2.50, 2.18, 1.94, 1.77, 1.63),
+            (0.228, 0.341, 0.446, 0.549, 0.650, 0.751, 0.852, 0.954, 1.06, 1.16),
+        ),
+    ),
+}
 
 
 def _coefficients() -> Reals:
@@ -100,6 +143,26 @@ def _sliding() -> tuple[Reals, Reals]:
     return np.hypot(local[..., 1], local[..., 2]).ravel(), exact.ravel()
 
 
+@cache
+def _beside_contact() -> Reals:
+    """Creep forces over mu N under CONTACT's normal forces and creepages, shape (21 shifts, 2)."""
+    G, nu, mu = 82e9, 0.28, 0.3
+    forces = []
+    for row, case in enumerate(REFERENCE):
+        pair, u = placed(row)
+        found = pair.contacts(np.array([u]), case["roll_ws"])
+        A = 0.5 / ((R0 + found.dz_w) * np.hypot(1.0, found.tan_gamma))
+        B = transverse_curvature(pair.wheel, pair.canted_rail, found, 4e-3)
+        a, b, _ = (x[0] * case["Fn"] ** (1.0 / 3.0) for x in hertz(A, B, 2.0 * G * (1.0 + nu), nu))
+        C11, C22, C23, _ = kalker(a / b, nu)
+        spin = 1e3 * case["cphi"]  # printed per mm
+        T = -G * a * b * np.array([C11 * case["cksi"], C22 * case["ceta"] + np.sqrt(a * b) * C23 * spin])
+        size = np.hypot(*T)
+        tau = size / (mu * case["Fn"])
+        forces.append(T / size * (tau - tau**2 / 3.0 + tau**3 / 27.0 if tau <= 3.0 else 1.0))
+    return np.array(forces)
+
+
 CASES = (
     Case(
         name="hertz-table",
@@ -134,15 +197,18 @@ CASES = (
         why="printed digits",
         compute=lambda: [1e8 * zhai_G("zhai_cone", 0.43), 1e8 * zhai_G("zhai_worn", 0.43)],
     ),
-    Case(
-        name="kalker-table",
-        kind="validation",
-        quantity="C11, C22, C23, C33 at nu = 0.25, 20 ratios of axes",
-        source=KALKER,
-        reference=np.concatenate([np.transpose(NARROW), np.transpose(LONG)]),
-        rtol=1e-12,
-        why="rounding: interpolation at its own nodes",
-        compute=lambda: kalker(np.concatenate([RATIOS, 1.0 / RATIOS]), 0.25),
+    *(
+        Case(
+            name="kalker-table" if nu == 0.25 else f"kalker-table-{nu:g}",
+            kind="validation",
+            quantity=f"C11, C22, C23, C33 at nu = {nu:g}, 20 ratios of axes",
+            source=KALKER,
+            reference=np.concatenate([np.transpose(narrow), np.transpose(long)]),
+            rtol=1e-12,
+            why="rounding: interpolation at its own nodes",
+            compute=lambda nu=nu: kalker(np.concatenate([RATIOS, 1.0 / RATIOS]), nu),
+        )
+        for nu, (narrow, long) in TABLE.items()
     ),
     Case(
         name="kalker-steel",
@@ -173,5 +239,35 @@ CASES = (
         rtol=1e-9,
         why="rounding; 1e-12 N is added to T in the kernel",
         compute=lambda: _sliding()[0],
+    ),
+    Case(
+        name="contact-creep-tread",
+        kind="validation",
+        quantity="creep forces along and across over mu N, Manchester wheelset on tread and flange root, 0 to 6 mm",
+        source=FULL_THEORY,
+        reference=CREEP[:FLANK],
+        atol=0.1,
+        why=SHEN,
+        compute=lambda: _beside_contact()[:FLANK],
+    ),
+    Case(
+        name="contact-creep-flank",
+        kind="validation",
+        quantity="resultant creep force over mu N on the flank, 6.5 to 10 mm",
+        source=FULL_THEORY,
+        reference=np.hypot(*CREEP[FLANK:].T),
+        atol=0.1,
+        why=SHEN,
+        compute=lambda: np.hypot(*_beside_contact()[FLANK:].T),
+    ),
+    Case(
+        name="contact-creep-flank-parts",
+        kind="validation",
+        quantity="its parts along (eight), then across (eight)",
+        source=FULL_THEORY,
+        reference=CREEP[FLANK:].T,
+        atol=0.105,
+        why="about 10 %, to two digits: at tau > 40 spin turns the full theory's force, which one saturation does not",
+        compute=lambda: _beside_contact()[FLANK:].T,
     ),
 )

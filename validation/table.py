@@ -13,7 +13,7 @@ from rich.table import Table
 
 from validation.case import Outcome
 
-__all__ = ["COLUMNS", "insert", "markdown", "show"]
+__all__ = ["COLUMNS", "headlines", "insert", "markdown", "show"]
 
 COLUMNS = ("case", "quantity", "reference", "ours", "deviation", "tolerance", "source", "verdict")
 BEGIN, END = "<!-- verification -->", "<!-- /verification -->"
@@ -61,12 +61,8 @@ def show(outcomes: Sequence[Outcome], console: Console) -> None:
 def markdown(outcomes: Sequence[Outcome]) -> str:
     """The same as Markdown, headed by what it was computed with."""
     versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("tiengine", "taichi", "numpy", "scipy"))
-    judged = [outcome for outcome in outcomes if outcome.verdict in ("ok", "MISS")]
-    missed = [outcome.case.name for outcome in judged if outcome.verdict == "MISS"]
     lines = [
-        f"`python -m validation`: {len(judged) - len(missed)} of {len(judged)} cases met"
-        + (f"; missed: {', '.join(missed)}" if missed else "")
-        + f". Python {platform.python_version()}, {versions}.",
+        f"{_score(outcomes)} Python {platform.python_version()}, {versions}.",
         "Where a case has many numbers, the one that uses most of its tolerance is shown.",
     ]
     for kind, title in TITLES.items():
@@ -75,6 +71,26 @@ def markdown(outcomes: Sequence[Outcome]) -> str:
             lines += ["", f"**{title}**", "", _line(COLUMNS), _line(["---"] * len(COLUMNS))]
             lines += [_line(_row(outcome)) for outcome in chosen]
     return "\n".join(lines) + "\n"
+
+
+def headlines(outcomes: Sequence[Outcome], names: Sequence[str]) -> str:
+    """The README's share: how many cases are met, and the few that say most."""
+    columns = ("quantity", "reference", "ours", "tolerance", "source")
+    lines = [f"{_score(outcomes)} All of them: [table](validation/report/verification.md).", ""]
+    lines += [_line(columns), _line(["---"] * len(columns))]
+    for outcome in outcomes:
+        if outcome.case.name in names:
+            cells = (outcome.case.quantity, outcome.reference, outcome.ours, outcome.tolerance, outcome.case.source)
+            lines.append(_line(cells))
+    return "\n".join(lines) + "\n"
+
+
+def _score(outcomes: Sequence[Outcome]) -> str:
+    judged = [outcome for outcome in outcomes if outcome.verdict in ("ok", "MISS")]
+    missed = [outcome.case.name for outcome in judged if outcome.verdict == "MISS"]
+    return f"`python -m validation`: {len(judged) - len(missed)} of {len(judged)} cases met" + (
+        f"; missed: {', '.join(missed)}." if missed else "."
+    )
 
 
 def insert(text: str, file: Path) -> None:

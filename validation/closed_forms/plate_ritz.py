@@ -3,7 +3,8 @@
 w = sum q_mn P_m(2x/L) P_n(2y/B), products of Legendre polynomials. They satisfy no boundary condition,
 which is right for free edges: their conditions, Poisson's terms included, come from the strain energy
   U = D/2 int [w_xx^2 + w_yy^2 + 2 nu w_xx w_yy + 2 (1 - nu) w_xy^2].
-The kinetic energy has the rotary inertia rho h^3/12 as an option. Frequencies converge from above.
+The kinetic energy has the rotary inertia rho h^3/12 as an option, the strain energy a Winkler bed k w^2/2. Frequencies
+converge from above.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ def frequencies(
     mass_per_area: float,
     rotary: float,
     degree: int,
+    bed: float = 0.0,
 ) -> NDArray[np.float64]:
     """Natural frequencies, the three rigid modes included.
 
@@ -33,6 +35,7 @@ def frequencies(
         mass_per_area: rho h [kg/m^2].
         rotary: rho h^3 / 12 [kg], 0 to leave rotary inertia out.
         degree: Highest Legendre polynomial in each direction.
+        bed: Bed under the whole plate [N/m^3].
 
     Returns:
         Circular frequencies [rad/s], ascending, shape ((degree + 1)^2,).
@@ -45,7 +48,7 @@ def frequencies(
 
     cross = plate(2, 0, 0, 2)
     bending = plate(2, 2, 0, 0) + plate(0, 0, 2, 2) + nu * (cross + cross.T)
-    K = rigidity * (bending + 2.0 * (1.0 - nu) * plate(1, 1, 1, 1))
+    K = rigidity * (bending + 2.0 * (1.0 - nu) * plate(1, 1, 1, 1)) + bed * plate(0, 0, 0, 0)
     M = mass_per_area * plate(0, 0, 0, 0) + rotary * (plate(1, 1, 0, 0) + plate(0, 0, 1, 1))
     return np.sqrt(np.abs(scipy.linalg.eigvalsh(K, M)))
 

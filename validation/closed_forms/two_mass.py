@@ -8,7 +8,8 @@ gives k_t = 8 EI beta^3 and, by kinetic energy, m_r = 3 m/(2 beta), the damper l
 lower of the two natural frequencies (the upper is P1).
 
 Better, and to see how crude that is: the receptance alpha of a Timoshenko beam under its load on a damped foundation in
-series with a bed. By Fourier transform along the rail, with K(omega) = 1/(1/(k + i omega c) + 1/k_bed) - m omega^2,
+series with a slab on its bed. By Fourier transform along the rail, with k_b = k_bed + i omega c_bed - omega^2 m_slab
+(a slab without bending stiffness: it follows the load) and K(omega) = 1/(1/(k + i omega c) + 1/k_b) - m omega^2,
 
     alpha = 1/(2 pi) int B/D dxi,  B = EI xi^2 + kGA - rho I omega^2,  D = (kGA xi^2 + K) B - (kGA xi)^2,
 
@@ -43,6 +44,8 @@ class WheelOnTrack:
         kGA: Shear stiffness of the rail [N].
         rho_I: Its rotary inertia per length [kg m].
         bed: What the foundation stands on [N/m^2].
+        bed_damping: Its damping [N s/m^2].
+        bed_mass: Mass between foundation and bed per length [kg/m].
         primary_stiffness: Of the suspension above the wheel, k_p [N/m].
         primary_damping: c_p [N s/m].
     """
@@ -56,6 +59,8 @@ class WheelOnTrack:
     kGA: float = np.inf
     rho_I: float = 0.0
     bed: float = np.inf
+    bed_damping: float = 0.0
+    bed_mass: float = 0.0
     primary_stiffness: float = 0.0
     primary_damping: float = 0.0
 
@@ -95,7 +100,8 @@ def beam_receptance(system: WheelOnTrack, frequency: Reals, distance: float = 0.
     s, found = system, np.empty(len(frequency), dtype=np.complex128)
     flexible = 0.0 if np.isinf(s.kGA) else 1.0 / s.kGA
     for n, omega in enumerate(2.0 * np.pi * frequency):
-        K = 1.0 / (1.0 / (s.k + 1j * omega * s.c) + 1.0 / s.bed) - s.m * omega**2
+        bed = s.bed + 1j * omega * s.bed_damping - s.bed_mass * omega**2
+        K = 1.0 / (1.0 / (s.k + 1j * omega * s.c) + 1.0 / bed) - s.m * omega**2
         B = np.array([s.EI * flexible, 0.0, 1.0 - s.rho_I * omega**2 * flexible])  # over kGA, as is D
         slope = np.array([s.EI, 0.0, -s.rho_I * omega**2, 0.0, 0.0])
         D = np.polyadd(slope, K * B)

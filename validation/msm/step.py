@@ -111,6 +111,7 @@ class FullStepper:
         S, n = state.slabs.shape[1:]
         self._predicted, self._linear, self._push = np.zeros((2, S, n)), np.zeros((S, n)), np.zeros((S, n))
         self._lateral = np.stack([np.ones_like(track.groups[0].slab.seat_x), track.groups[0].slab.seat_x])
+        self._seat_rows = track.seat.transpose(1, 0, 2).reshape(track.slab_modes, -1)  # one product for all seats
         train, newmark = track.train, track.newmark
         operator = newmark.operator(
             sp.csr_array(train.M), sp.csr_array(train.C + V * train.C_speed), sp.csr_array(train.K)
@@ -197,7 +198,7 @@ class FullStepper:
         plate = numbers[KV] * u[:, :m] + numbers[CV] * v[:, :m]
         rigid = (numbers[KL] * u[:, m:] + numbers[CL] * v[:, m:]) @ self._lateral
         out = np.empty((3, 2, *rigid.shape))
-        np.matmul(plate, track.seat, out=out[:2].reshape(4, *rigid.shape))
+        out[:2] = (plate @ self._seat_rows).reshape(len(u), 2, 2, -1).transpose(1, 2, 0, 3)
         out[1] *= track.half_base**2
         out[2] = rigid
         return out
@@ -205,8 +206,8 @@ class FullStepper:
     def _push_slabs(self, force: Reals) -> None:
         """Generalised forces of the seats on the slabs, from (3, 2, slabs, 9)."""
         m, push = self.track.slab_modes, self._push
-        by_seat = np.matmul(force[:2].reshape(4, *force.shape[2:]), self.track.seat.transpose(0, 2, 1))
-        np.sum(by_seat, axis=0, out=push[:, :m])
+        by_slab = force[:2].transpose(2, 0, 1, 3).reshape(len(push), -1)
+        np.matmul(by_slab, self._seat_rows.T, out=push[:, :m])
         push[:, m:] = force[2].sum(axis=0) @ self._lateral.T
 
     def _solve_slabs(self) -> None:
