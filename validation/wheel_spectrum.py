@@ -204,6 +204,7 @@ def draw(path: Path) -> None:
     axes[1].set_ylabel("|Q/z| [kN/mm]")
     axes[1].set_title("Rough track, 350 km/h", loc="left", fontsize=10)
     axes[1].legend(frameon=False, fontsize=8)
+    axes[0].set_ylim(bottom=1e-11)
     for axis, end in zip(axes, (400.0, 194.0), strict=True):
         axis.set_xlim(0.0, end)
         axis.grid(color="0.9")

@@ -29,7 +29,7 @@ jump of the material rate, and R jumps down by
 
 (the second factor: the jump's own shear waves). The jump at a seat reaches its neighbours as a smaller one.
 
-| here | MODEL.md |
+| here | the engine |
 |---|---|
 | w, R, P positive down, seat force on the ground | w, F_V |
 | x - V t = 0 under the load | s = l / 2 |
