@@ -12,7 +12,7 @@ from rich.progress import Progress
 from tiengine import backend
 from tiengine.scenario import load_scenario
 from validation.case import Outcome, evaluate
-from validation.table import headlines, insert, markdown, show
+from validation.table import headlines, insert, keep, markdown, show
 
 ROOT = Path(__file__).resolve().parents[1]
 REPORT = ROOT / "validation" / "report" / "verification.md"
@@ -21,7 +21,7 @@ REPORT = ROOT / "validation" / "report" / "verification.md"
 @click.group(invoke_without_command=True)
 @click.option("--quick", is_flag=True, help="Only the cases that together take less than five minutes.")
 @click.option("--only", multiple=True, metavar="NAME", help="Only cases whose name begins so; may be repeated.")
-@click.option("--write", is_flag=True, help="Write the table into README.md and validation/report.")
+@click.option("--write", is_flag=True, help="Bring the table of README.md and validation/report up to date.")
 @click.pass_context
 def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool) -> None:
     """Hold the engine to closed forms, others' numbers and its own convergence; status 1 on a miss."""
@@ -42,8 +42,9 @@ def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool
     show(outcomes, console)
     if write:
         REPORT.parent.mkdir(exist_ok=True)
-        REPORT.write_text(f"# Verification\n\n{markdown(outcomes)}", encoding="utf-8")
-        insert(headlines(outcomes, HEADLINES), ROOT / "README.md")
+        known = keep(outcomes, REPORT.with_suffix(".json"), CASES)
+        REPORT.write_text(f"# Verification\n\n{markdown(known)}", encoding="utf-8")
+        insert(headlines(known, HEADLINES), ROOT / "README.md")
     sys.exit(any(outcome.verdict == "MISS" for outcome in outcomes))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import platform
 from collections.abc import Sequence
 from importlib import metadata
@@ -11,11 +12,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from validation.case import Outcome
+from validation.case import Case, Outcome
 
-__all__ = ["COLUMNS", "headlines", "insert", "markdown", "show"]
+__all__ = ["COLUMNS", "headlines", "insert", "keep", "markdown", "show"]
 
 COLUMNS = ("case", "quantity", "reference", "ours", "deviation", "tolerance", "source", "verdict")
+TEXTS = ("verdict", "reference", "ours", "deviation", "tolerance", "seconds")
+"""Of an outcome, what is kept from one run to the next."""
 BEGIN, END = "<!-- verification -->", "<!-- /verification -->"
 TITLES = {
     "verification": "Against closed forms",
@@ -91,6 +94,25 @@ def _score(outcomes: Sequence[Outcome]) -> str:
     return f"`python -m validation`: {len(judged) - len(missed)} of {len(judged)} cases met" + (
         f"; missed: {', '.join(missed)}." if missed else "."
     )
+
+
+def keep(outcomes: Sequence[Outcome], file: Path, cases: Sequence[Case]) -> list[Outcome]:
+    """Add outcomes to those of earlier runs, so that a few cases can be computed anew without all the others.
+
+    Args:
+        outcomes: New ones.
+        file: JSON with the texts of each case, rewritten.
+        cases: All cases; what belongs to none of them any more is dropped.
+
+    Returns:
+        Everything known, in the order of the cases.
+    """
+    known = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    for outcome in outcomes:
+        known[outcome.case.name] = {name: getattr(outcome, name) for name in TEXTS}
+    known = {case.name: known[case.name] for case in cases if case.name in known}
+    file.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+    return [Outcome(case, **known[case.name]) for case in cases if case.name in known]
 
 
 def insert(text: str, file: Path) -> None:
