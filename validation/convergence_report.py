@@ -133,7 +133,10 @@ def table() -> str:
     lines += ["", f"**Whole settings**, against {CONVERGED.label}", "", *_head("setting")]
     lines += [_line(f"{words}: {run.label}", run, CONVERGED, default) for words, run in TOTALS.items()]
     lines += ["", CAVEAT]
-    lines += ["", f"The converged run takes {real_time_factor(CONVERGED) / default:.0f} times as long as the default."]
+    lines += [
+        "",
+        f"The converged run takes {real_time_factor(CONVERGED) / default:.0f} times as long as the first default.",
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -261,8 +261,8 @@ CASES = (
     Case(
         name="spectrum-P2-long",
         kind="verification",
-        quantity="frequency [Hz] and height [kN/mm] of that peak over 1550 m",
-        source="the same",
+        quantity="P2 resonance over 1550 m: frequency [Hz] and height [kN/mm] of the peak of |Q/z|",
+        source="two wheels of a bogie, bounce and roll, primary suspension, Timoshenko beam, slab on its bed",
         reference=_p2_receptance,
         rtol=0.06,
         why="scatter 2.5 %, so 2.0 Hz, half the resolution 1 Hz; of the height, frame at rest 5 %, bed and seats 3 %",
