@@ -28,6 +28,7 @@ ALL_MODES, TRADITIONAL_MODES = 90, 20  # of a slab: its mesh has 90
 PER_METRE = 2.0
 LENGTHS = (24, 36, 48, 60)
 SAME_WAY = ("train.start=30", "train.distance=600")
+BLOW = "; waves of the blow that ends a wheel's flight come back from the window's ends, 0.07 % with 48 m"
 SOURCE = "traditional model, 660 m of rail, 2 modes a metre, slabs with all modes of the mesh"
 
 
@@ -114,7 +115,7 @@ CASES = (
             source=SOURCE,
             reference=bound,
             rule="at most",
-            why="expected of two independent programs",
+            why="expected of two independent programs" + BLOW * (length == 36 and direction == "vertical"),
             compute=lambda length=length, direction=direction: difference(full(), window(length), direction).largest,
             quick=False,
         )
