@@ -101,6 +101,18 @@ def seat_force(rail: Array, slab: Array, scale: float, constants: Array):
 
 
 @ti.func
+def absorbing_force(rail: Array, s: float, constants: Array):
+    """(F_V, F_L, M_b) on the ground of the dampers that swallow waves near the window's ends.
+
+    As strong as the fastening's own damper at the very end, falling with the square of the depth in the zone to none.
+    """
+    zone, a, b = constants[at.ABSORBING_ZONE], constants[at.ARM_FASTENING], constants[at.HALF_BASE]
+    depth = ti.max(0.0, zone - ti.min(s, constants[at.LENGTH] - s)) / ti.max(zone, 1e-9)  # no zone: no depth
+    cv, cl = depth * depth * constants[at.C_VERTICAL], depth * depth * constants[at.C_LATERAL]
+    return ti.Vector([cv * rail[1], cl * (rail[3] - a * rail[5]), b * b * cv * rail[5]])
+
+
+@ti.func
 def seat_forces(
     b: int,
     first_seat: int,
@@ -125,7 +137,8 @@ def seat_forces(
     slots = dims[at.SLOTS]
     a = constants[at.ARM_FASTENING]
     for j in range(dims[at.SEATS]):
-        inside = s0 + j * constants[at.SPACING] < constants[at.LENGTH]
+        s = s0 + j * constants[at.SPACING]
+        inside = s < constants[at.LENGTH]
         slab = (first_seat + j) // per_slab
         seat = (first_seat + j) % per_slab
         base = dims[at.SLABS] + (b * slots + slab % slots) * dofs
@@ -149,7 +162,7 @@ def seat_forces(
                     motion[at.F, q] = motion[at.F, q] + load[1]
                     motion[at.F, q + 1] = motion[at.F, q + 1] + x[seat] * load[1]
                     now = slab_motion(base, dofs, seat, rail, motion, index, shape, x, at.U, at.V)
-                force = seat_force(r, now, scale[b, j, rail], constants)
+                force = seat_force(r, now, scale[b, j, rail], constants) + absorbing_force(r, s, constants)
                 force_out[b, 3 * rail, j] = force[0]
                 force_out[b, 3 * rail + 1, j] = force[1]
                 force_out[b, 3 * rail + 2, j] = force[2] - a * force[1]

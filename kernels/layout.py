@@ -63,8 +63,9 @@ MOTION_ROWS = 8
     RESIDUAL_VERTICAL,  # compliance of the modes left out, under a wheel, in w, v, theta_x; zero if not wanted
     RESIDUAL_LATERAL,
     RESIDUAL_TORSION,
+    ABSORBING_ZONE,  # length of the zone with dampers to the ground at either end of the window [m]; zero for none
     N_CONSTANTS,
-) = range(28)
+) = range(29)
 
 # Columns of ``clock[step, :]`` (float64): the window at t_{n+1}.
 (POSITION, SPEED, SPEED_RATE, FIRST_SEAT_S, FIRST_SEAT, FIRST_SLAB, N_CLOCK) = range(7)

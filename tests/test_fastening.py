@@ -288,3 +288,25 @@ def test_smeared_part_is_the_mean_of_the_seats(model: Model) -> None:
         shape = np.sin(np.multiply.outer(s, k))
         mean += shape.T @ shape / len(starts)
     np.testing.assert_allclose(mean, length / (2.0 * d) * np.eye(n), atol=2e-4 * length / (2.0 * d))
+
+
+def test_absorbing_zone_is_more_dampers_near_the_ends(model: Model) -> None:
+    """Against dampers to the ground written out; none beyond the zone, none without it."""
+    zone, X = 6.0, 33.3
+    case, plain = Seated(model, X), Seated(model, X)
+    case.constants[at.ABSORBING_ZONE] = zone
+    for each in (case, plain):
+        each.randomise(3)
+        each.launch()
+    g = model.given
+    a, b = g.rail.arm_fastening, g.rail.half_base
+    s = plain.clock[0, at.FIRST_SEAT_S] + g.slab.fastening_pitch * np.arange(case.state.seat_force.shape[2])
+    depth = np.clip(zone - np.minimum(s, g.length - s), 0.0, None) / zone * (s < g.length)
+    w, v, roll = (case.state.seat_motion[0, row] for row in (1, 3, 5))  # rates, left rail
+    vertical, lateral = g.fastening.vertical_damping * depth**2, g.fastening.lateral_damping * depth**2
+    F_V, F_L = vertical * w, lateral * (v - a * roll)
+    expected = np.stack([F_V, F_L, b**2 * vertical * roll - a * F_L])
+    found = (case.state.seat_force - plain.state.seat_force)[0, :3]
+    assert np.abs(expected).max() > 1e3
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(plain.state.seat_force).max())  # differences of sums
+    assert np.all(found[:, (s > zone) & (s < g.length - zone)] == 0.0)

@@ -204,6 +204,7 @@ BAD = {
     "ensemble.size=4": "ensemble.size = 4: must be 1; several trains at once are not offered yet",
     # between keys
     "numerics.window=20": "numerics.window = 20: window shorter than the train; must be at least 24 m",
+    "numerics.absorbing_zone=7": "numerics.absorbing_zone = 7: must be at most 6 m in this window",
     "train.coupler_pitch=[20.0]": "train.coupler_pitch = [20.0]: must be one number or 0, one a coupling",
     "irregularity.spectrum=german_lo": "irregularity.spectrum = 'german_lo': unknown; did you mean",
     "irregularity.wavelength_max=0.5": "irregularity.wavelength_m",

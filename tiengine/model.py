@@ -66,7 +66,8 @@ class Ingredients:
         passes: Passes a step.
         cover: Enough slabs for every seat of the window, or the paper's count.
         explicit_mortar: The bed in the explicit half.
-        local_compliance: Add the static compliance of the modes left out, under wheels and at seats.
+        local_compliance: Add the static compliance of the modes left out, under the wheels.
+        absorbing_zone: Length of the zones at the window's ends with dampers from rail to ground [m]; 0 for none.
         trains: Trains advanced together.
     """
 
@@ -87,6 +88,7 @@ class Ingredients:
     cover: bool = True
     explicit_mortar: bool = False
     local_compliance: bool = False
+    absorbing_zone: float = 0.0
     trains: int = 1
 
     @property
@@ -240,6 +242,7 @@ def _constants(given: Ingredients, window: RailWindow) -> NDArray[np.float64]:
     c[at.SMEARING] = smearing(window, given.slab.fastening_pitch)
     if given.local_compliance:
         c[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1] = window.missing_compliance
+    c[at.ABSORBING_ZONE] = given.absorbing_zone
     c[at.TABLE_U0], c[at.TABLE_DU] = table.u_min, table.du
     c[at.TABLE_ALPHA0], c[at.TABLE_DALPHA] = table.alpha_min, table.dalpha
     return c

@@ -114,12 +114,12 @@ class RailWindow:
         In w and v [m/N] (2/l) sum over i > N of 1/2 [1/(kappa G A k_i^2) + 1/(EI k_i^4)], in theta_x [rad/(N m)] the
         same of 1/(GK k_i^2); the supports are soft against waves so short. Shape (3,), order w, v, theta_x.
         """
-        r, n, half = self.rail, self.modes, self.length / 2.0
+        r, n = self.rail, self.modes
         k1 = np.pi / self.length
         inverse_squares, inverse_fourths = zeta(2.0, n + 1.0) / k1**2, zeta(4.0, n + 1.0) / k1**4
         shear, bending = r.G * r.A * np.array([r.kappa_vertical, r.kappa_lateral]), r.E * np.array([r.Iy, r.Iz])
         across = inverse_squares / shear + inverse_fourths / bending
-        missing: NDArray[np.float64] = np.append(across, inverse_squares / r.GK) / (2.0 * half)
+        missing: NDArray[np.float64] = np.append(across, inverse_squares / r.GK) / self.length
         return missing
 
     def vertical(self, V: float, V_rate: float = 0.0) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:

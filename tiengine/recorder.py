@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,6 +75,22 @@ class Recorder:
     def body_every(self) -> int:
         """Steps between two samples of the bodies."""
         return self._steps(self.scenario.output.body_interval)
+
+    def rows(self, done: int, count: int) -> Iterator[tuple[int, int, int]]:
+        """Steps of a chunk, with the rows of the wheels' and the bodies' records that each fills (-1 none).
+
+        Args:
+            done: Steps before the chunk.
+            count: Steps of the chunk.
+        """
+        wheel_row = body_row = 0
+        wheel_every, body_every = self.wheel_every, self.body_every
+        for i in range(count):
+            k = done + i + 1
+            wheels, bodies = k % wheel_every == 0, k % body_every == 0
+            yield i, wheel_row if wheels else -1, body_row if bodies else -1
+            wheel_row += wheels
+            body_row += bodies
 
     def groups(self) -> dict[str, GroupSpec]:
         """What each train records."""

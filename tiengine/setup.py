@@ -48,6 +48,7 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         passes=numerics.passes,
         cover=numerics.slab_count == "cover",
         local_compliance=numerics.truncation == "local",
+        absorbing_zone=numerics.absorbing_zone,
         explicit_mortar=numerics.mortar == "explicit",
     )
 

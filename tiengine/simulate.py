@@ -168,7 +168,8 @@ def _loop(
         x, V, V_rate = x[1 : count + 1], V[1 : count + 1], V_rate[1 : count + 1]
         wheels = x[:, None] + model.given.train.wheelset_x
         stepper.load(x - model.centre_s, V, V_rate, irregularity.sample(wheels)[None])
-        _advance(stepper, recorder, done, count)
+        for step in recorder.rows(done, count):
+            stepper.step(*step)
         failure = check_chunk(model, chunk, recorder, done + 1, x)
         clock = time.perf_counter()
         recorder.write(writer, chunk, done + 1, x)
@@ -191,18 +192,6 @@ def _loop(
     if failure is not None:
         raise RunFailedError(failure)
     return result
-
-
-def _advance(stepper: Stepper, recorder: Recorder, done: int, count: int) -> None:
-    """The steps of one chunk."""
-    wheel_row = body_row = 0
-    wheel_every, body_every = recorder.wheel_every, recorder.body_every
-    for i in range(count):
-        k = done + i + 1
-        wheels, bodies = k % wheel_every == 0, k % body_every == 0
-        stepper.step(i, wheel_row if wheels else -1, body_row if bodies else -1)
-        wheel_row += wheels
-        body_row += bodies
 
 
 def _duration(speed: SpeedProfile, start: float, distance: float) -> float:

@@ -158,7 +158,8 @@ def _loop(
     while position < end - 1e-9:
         chainage = load(stepper, scenario, irregularity, position, end)
         count = len(chainage)
-        _advance(stepper, recorder, done, count)
+        for step in recorder.rows(done, count):
+            stepper.step(*step)
         if not np.isfinite(stepper.state.force).all():
             raise RuntimeError(f"the full-length model ran away before {chainage[-1]:.1f} m; shorten the time step")
         before = time.perf_counter()
@@ -178,17 +179,6 @@ def _loop(
             "real_time_factor": loop / (done * dt),
         }
     )
-
-
-def _advance(stepper: FullStepper, recorder: Recorder, done: int, count: int) -> None:
-    """The steps of one chunk."""
-    wheel_row = body_row = 0
-    for i in range(count):
-        k = done + i + 1
-        wheels, bodies = k % recorder.wheel_every == 0, k % recorder.body_every == 0
-        stepper.step(i, wheel_row if wheels else -1, body_row if bodies else -1)
-        wheel_row += wheels
-        body_row += bodies
 
 
 def _samples(track: FullTrack, buffers: Buffers) -> Samples:
