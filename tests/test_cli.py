@@ -36,7 +36,7 @@ def fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
     module.calls = []
     module.failure = None
 
-    def run(scenario, output=None, *, force=False, progress=None):
+    def run(scenario, output=None, *, force=False, progress=None, workers=None):
         module.calls.append(scenario)
         groups = {"wheel": GroupSpec.standard("wheel", tuple(WHEEL))}
         with Writer(output, to_toml(scenario), {}, [LABELS], groups, force=force) as writer:
@@ -47,7 +47,9 @@ def fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
             if module.failure is not None:
                 module.failure()
             walls = {f"wall_time_{part}": 0.5 for part in ("import", "jit", "setup", "loop", "writing")}
-            return writer.close({"dofs": 943, "time_step": 1e-4, "real_time_factor": 1.5, **walls})
+            return writer.close(
+                {"status": "complete", "dofs": 943, "time_step": 1e-4, "real_time_factor": 1.5, **walls}
+            )
 
     module.run = run
     monkeypatch.setitem(sys.modules, "tiengine.simulate", module)

@@ -201,7 +201,7 @@ BAD = {
     "numerics.modes_per_metre=inf": "numerics.modes_per_metre = inf: must be a finite number",
     "numerics.start=rest": "numerics.start = 'rest': must be 'equilibrium' or 'zero'",
     "track.friction=0": "track.friction = 0: must be greater than 0",
-    "ensemble.size=4": "ensemble.size = 4: must be 1; several trains at once are not offered yet",
+    "ensemble.size=0": "ensemble.size = 0: must be greater than or equal to 1",
     # between keys
     "numerics.window=20": "numerics.window = 20: window shorter than the train; must be at least 24 m",
     "numerics.absorbing_zone=7": "numerics.absorbing_zone = 7: must be at most 6 m in this window",

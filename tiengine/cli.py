@@ -1,7 +1,7 @@
-"""Command line: ``tiengine run``, ``tiengine list``, ``tiengine info``.
+"""Command line: ``tiengine run``, ``tiengine profile``, ``tiengine list``, ``tiengine info``.
 
 Bad input ends with one line on stderr and exit status 2, a run that fails on its way with status 1. Taichi is imported
-only by ``run``, so that the others answer at once.
+only by ``run`` and ``profile``, so that the others answer at once.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from tiengine.quantity import InputError
 __all__ = ["main"]
 
 SUMMARY = {
+    "trains": ("trains", "{:d}"),
+    "workers": ("worker processes (0: none but this one)", "{:d}"),
     "dofs": ("degrees of freedom", "{:d}"),
     "time_step": ("time step", "{:.3g} s"),
     "simulated_time": ("simulated time", "{:.3f} s"),
@@ -37,6 +39,8 @@ SUMMARY = {
     "wall_time_setup": ("wall time, set-up", "{:.2f} s"),
     "wall_time_loop": ("wall time, loop", "{:.2f} s"),
     "wall_time_writing": ("wall time, writing", "{:.2f} s"),
+    "wall_time_total": ("wall time, all but import", "{:.2f} s"),
+    "peak_memory": ("peak memory, all processes", "{:.0f} MB"),
 }
 """Root attributes of a result that are shown: their words and format."""
 
@@ -64,10 +68,13 @@ def main() -> None:
 @click.argument("scenario")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Result file; default: the scenario's name.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key: train.speed_kmh=300")
+@click.option("--workers", type=click.IntRange(1), help="Processes for an ensemble; default: one a core.")
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option("--force", is_flag=True, help="Replace an existing result file.")
-def run(scenario: str, output: Path | None, settings: Sequence[str], quiet: bool, force: bool) -> None:
-    """Simulate SCENARIO, the name of a built-in one or the path of a TOML file."""
+def run(
+    scenario: str, output: Path | None, settings: Sequence[str], workers: int | None, quiet: bool, force: bool
+) -> None:
+    """Simulate SCENARIO, the name of a built-in one or the path of a TOML file: one train or an ensemble."""
     from tiengine.scenario import load_scenario
 
     resolved = load_scenario(scenario, settings)
@@ -83,13 +90,66 @@ def run(scenario: str, output: Path | None, settings: Sequence[str], quiet: bool
     console = Console(stderr=True, quiet=quiet)
     try:
         with _ended_by_sigterm(), _progress(console, resolved.name) as progress:
-            result = simulate.run(resolved, path, force=force, progress=progress)
+            result = simulate.run(resolved, path, force=force, progress=progress, workers=workers)
     except RunFailedError as failure:
         click.echo(f"run failed: {failure}; {path} holds what was computed until then", err=True)
         raise SystemExit(1) from None
     with result:
         if not quiet:
             _print_rows([*_summary(result.attributes), ("result", str(path))])
+        failures = result.failures
+    for train, why in failures.items():
+        click.echo(f"train {train} failed: {why}", err=True)
+    if failures:
+        raise SystemExit(1)
+
+
+@main.command()
+@click.argument("scenario", default="paper")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key: train.speed_kmh=300")
+@click.option("--trains", type=click.IntRange(1), help="Trains advanced together; default: the scenario's.")
+@click.option("--seconds", type=float, default=1.0, show_default=True, help="Simulated time to measure.")
+@click.option("--steps", type=click.IntRange(2), help="Steps to measure instead.")
+@click.option("--json", "file", type=click.Path(path_type=Path), help="Write the report here too, replacing a file.")
+@click.option("--compare", nargs=2, type=click.Path(path_type=Path), help="Set two such files side by side instead.")
+def profile(
+    scenario: str,
+    settings: Sequence[str],
+    trains: int | None,
+    seconds: float,
+    steps: int | None,
+    file: Path | None,
+    compare: tuple[Path, Path] | None,
+) -> None:
+    """Measure where the time of SCENARIO's loop goes, stage by stage, in this process."""
+    from tiengine import profile_report, profile_tables
+
+    if compare:
+        reports = [profile_report.read_json(path) for path in compare]
+        comparison = profile_report.compare(*reports)
+        profile_tables.show(profile_tables.comparison_table(comparison, [str(path) for path in compare]))
+        return
+
+    from tiengine.scenario import load_scenario
+
+    resolved = load_scenario(scenario, settings)
+    if file is not None:
+        from tiengine.writer import check_output
+
+        check_output(file, force=True)
+
+    from tiengine import profiling
+    from tiengine.events import RunFailedError
+
+    try:
+        with _ended_by_sigterm():
+            report = profiling.profile(resolved, trains=trains, seconds=seconds, steps=steps)
+    except RunFailedError as failure:
+        click.echo(f"run failed: {failure}", err=True)
+        raise SystemExit(1) from None
+    if file is not None:
+        file.write_text(report.to_json() + "\n", encoding="utf-8")
+    profile_tables.show(profile_tables.report_tables(report))
 
 
 @main.command("list")

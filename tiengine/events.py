@@ -25,7 +25,7 @@ class RunFailedError(RuntimeError):
 
 def check_chunk(
     model: Model, chunk: Chunk, recorder: Recorder, first: int, position: NDArray[np.float64]
-) -> str | None:
+) -> dict[int, str]:
     """Look for numbers that ran away and for wheels that left the profile.
 
     Args:
@@ -36,12 +36,13 @@ def check_chunk(
         position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
 
     Returns:
-        A sentence, or None.
+        A sentence for each train that failed, by its place in the chunk.
     """
     steps = np.arange(first, first + len(position))
     recorded = np.flatnonzero(steps % recorder.wheel_every == 0)
     table = model.given.contact
     limit = table.u_min + (table.values.shape[0] - 2) * table.du
+    failed = {}
     for train, wheel in enumerate(chunk.wheel[:, : len(recorded)]):
         force, shift = wheel[..., at.NORMAL_FORCE], wheel[..., at.RELATIVE_SHIFT]
         wrong = ~np.isfinite(force) | ~np.isfinite(shift)
@@ -53,8 +54,8 @@ def check_chunk(
         if wrong.any():
             row, wheelset, side = np.argwhere(wrong)[0]
             i = recorded[row]
-            return (
-                f"train {train}: wheelset {wheelset + 1} {SIDES[side]} {why}"
+            failed[train] = (
+                f"wheelset {wheelset + 1} {SIDES[side]} {why}"
                 f" (t = {steps[i] * recorder.dt:.4f} s, chainage {position[i]:.2f} m)"
             )
-    return None
+    return failed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +13,11 @@ from tiengine.kernels import layout as at
 from tiengine.scenario import Scenario
 from tiengine.stepper import Chunk
 from tiengine.train import TrainModel
-from tiengine.writer import GroupSpec, TrainLabels, Writer
+from tiengine.writer import DTYPES, Block, GroupSpec, TrainLabels, Writer
 
 __all__ = ["Recorder", "Samples"]
+
+Times = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 WHEEL_COLUMNS = {
     "normal_force": at.NORMAL_FORCE,
@@ -94,7 +96,12 @@ class Recorder:
 
     def groups(self) -> dict[str, GroupSpec]:
         """What each train records."""
-        out = self.scenario.output
+        return self.groups_of(self.scenario)
+
+    @staticmethod
+    def groups_of(scenario: Scenario) -> dict[str, GroupSpec]:
+        """What each train of a scenario records."""
+        out = scenario.output
         return {
             "wheel": GroupSpec.standard("wheel", out.wheel_channels),
             "body": GroupSpec.standard("body", out.body_channels),
@@ -121,13 +128,28 @@ class Recorder:
             first: Number of the chunk's first step, counted from 1 (the state after one step).
             position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
         """
-        steps = np.arange(first, first + len(position))
-        at_bodies = steps % self.body_every == 0
+        for train, blocks in enumerate(self.blocks(chunk, first, position, range(len(chunk.wheel)))):
+            writer.write(train, blocks)
+
+    def blocks(
+        self, chunk: Chunk, first: int, position: NDArray[np.float64], rows: Iterable[int]
+    ) -> list[dict[str, Block]]:
+        """What some trains of a chunk have to write.
+
+        Args:
+            chunk: Filled buffers.
+            first: Number of the chunk's first step, counted from 1 (the state after one step).
+            position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
+            rows: Places of the trains in the chunk.
+
+        Returns:
+            For each of these trains its groups; arrays of its own, times shared between trains.
+        """
+        times = self._times(np.arange(first, first + len(position)), position)
+        at_bodies = np.arange(first, first + len(position)) % self.body_every == 0
         pressure = chunk.mortar[:, : int(at_bodies.sum())]
         held = _slabs_held(chunk.clock[: len(position)][at_bodies, at.FIRST_SLAB], pressure.shape[2])
-        for train in range(len(chunk.wheel)):
-            samples = Samples(chunk.wheel[train], chunk.body[train], held, pressure[train])
-            self.append(writer, train, samples, steps, position)
+        return [self._block(Samples(chunk.wheel[b], chunk.body[b], held, pressure[b]), times) for b in rows]
 
     def append(
         self, writer: Writer, train: int, samples: Samples, steps: NDArray[np.int64], position: NDArray[np.float64]
@@ -141,20 +163,36 @@ class Recorder:
             steps: Numbers of the steps, counted from 1, shape (steps,).
             position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
         """
-        out, time = self.scenario.output, steps * self.dt
+        writer.write(train, self._block(samples, self._times(steps, position)))
+
+    def _times(self, steps: NDArray[np.int64], position: NDArray[np.float64]) -> tuple[Times, Times]:
+        """Times [s] and chainages [m] of the wheels' samples and of the bodies'."""
         at_wheels, at_bodies = steps % self.wheel_every == 0, steps % self.body_every == 0
-        wheels, bodies = int(at_wheels.sum()), int(at_bodies.sum())
+        time = steps * self.dt
+        return (time[at_wheels], position[at_wheels]), (time[at_bodies], position[at_bodies])
+
+    def _block(self, samples: Samples, times: tuple[Times, Times]) -> dict[str, Block]:
+        """The groups of one train, in the precision of the file."""
+        out, (at_wheels, at_bodies) = self.scenario.output, times
+        wheels, bodies = len(at_wheels[0]), len(at_bodies[0])
         wheel, body = samples.wheel[:wheels], samples.body[:bodies]
         felt = {name: wheel[..., IRREGULARITY_COLUMNS[name]] for name in out.irregularity_channels}
         forces = {name: wheel[..., WHEEL_COLUMNS[name]] for name in out.wheel_channels}
-        writer.append(train, "wheel", time[at_wheels], position[at_wheels], forces)
-        writer.append(train, "irregularity", time[at_wheels], position[at_wheels], felt)
         shape = (bodies, body.shape[-1] // 5, 5)  # a short last chunk may hold no sample of the bodies
         motion = {name: body[:, BODY_ROWS[name]].reshape(shape) for name in out.body_channels}
-        writer.append(train, "body", time[at_bodies], position[at_bodies], motion)
         largest, smallest = samples.pressure[:bodies, :, 0], samples.pressure[:bodies, :, 1]
         bed = {"slab": samples.slab[:bodies], "largest_pressure": largest, "smallest_pressure": smallest}
-        writer.append(train, "mortar", time[at_bodies], position[at_bodies], bed)
+        return {
+            "wheel": self._cast(at_wheels, forces),
+            "irregularity": self._cast(at_wheels, felt),
+            "body": self._cast(at_bodies, motion),
+            "mortar": self._cast(at_bodies, bed),
+        }
+
+    def _cast(self, times: Times, channels: dict[str, NDArray[np.float64]]) -> Block:
+        """Copies, since the buffers are filled anew; in the file's precision, which halves what workers send."""
+        dtype = DTYPES[self.scenario.output.precision]
+        return Block(*times, {name: np.array(value, dtype) for name, value in channels.items()})
 
     def _steps(self, interval: float | str) -> int:
         return 1 if isinstance(interval, str) else max(1, round(interval / self.dt))

@@ -21,10 +21,12 @@ from tiengine.quantity import InputError
 if TYPE_CHECKING:
     from tiengine.scenario import Scenario
 
-__all__ = ["FORMAT", "FORMAT_VERSION", "Result", "open"]
+__all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "Result", "open"]
 
 FORMAT = "tiengine"
 FORMAT_VERSION = 1
+COMPLETE = "complete"
+"""Status of a train that has run to the end of its way."""
 
 
 class Result:
@@ -91,6 +93,39 @@ class Result:
         from tiengine.scenario import load_scenario  # Taichi comes with it: not for those who only read
 
         return load_scenario(tomllib.loads(self.scenario_toml))
+
+    def status(self, train: int = 0) -> str:
+        """``"complete"``, or why the train failed.
+
+        Args:
+            train: Index of the train.
+        """
+        return str(self.facts(train).get("status", self.attributes.get("status", "")))
+
+    @property
+    def failures(self) -> dict[int, str]:
+        """Why trains failed, by their index."""
+        found = {train: self.status(train) for train in range(self.trains)}
+        return {train: why for train, why in found.items() if why != COMPLETE}
+
+    def facts(self, train: int = 0) -> dict[str, Any]:
+        """Attributes of one train: vehicles, seed, DOFs, step, status, simulated time.
+
+        Args:
+            train: Index of the train.
+
+        Raises:
+            InputError: There is no such train.
+        """
+        return {key: _plain(value) for key, value in self[f"trains/{train:03d}"].attrs.items()}
+
+    def scenario_of(self, train: int) -> Scenario:
+        """The scenario of one train of an ensemble, by itself.
+
+        Args:
+            train: Index of the train.
+        """
+        return self.scenario.members[train]
 
     def group(self, name: str, train: int = 0) -> dict[str, NDArray[Any]]:
         """All of one group in memory.

@@ -10,9 +10,7 @@ Speeds are in km/h at this edge only.
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -21,6 +19,8 @@ from pydantic import BeforeValidator, Field
 
 from tiengine.channels import BODY, IRREGULARITY, WHEEL
 from tiengine.defects import FailedFastenings, MortarDefect, check_defects
+from tiengine.ensemble import Ensemble
+from tiengine.fields import channel_names, check_speed, number_or
 from tiengine.irregularity import IrregularityParams
 from tiengine.mortar import MortarVoid
 from tiengine.overrides import Overrides, apply_overrides
@@ -36,56 +36,6 @@ WINDOW_MARGIN_LEAST = 2.0  # m: below this the window's fixed ends, or an absorb
 STEPS_PER_WAVE = 8.0  # the shortest wave must be passed in no fewer steps (MODEL §6)
 
 
-def _finite(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _number_or(word: str, unit: str, low: float, high: float) -> BeforeValidator:
-    """Either one word or a number in ``low .. high``."""
-
-    def check(value: Any) -> Any:
-        if value == word:
-            return value
-        if not _finite(value) or not low <= value <= high:
-            raise ValueError(f"must be {word!r} or a number between {low:g} and {high:g} {unit}")
-        return float(value)
-
-    return BeforeValidator(check)
-
-
-def _check_speed(value: Any) -> Any:
-    """A speed, or rows of chainage and speed."""
-    if isinstance(value, tuple):
-        if len(value) < 2 or not all(isinstance(r, tuple) and len(r) == 2 and all(map(_finite, r)) for r in value):
-            raise ValueError("must be a number or two or more rows [chainage_m, km/h]")
-        if any(b[0] <= a[0] for a, b in pairwise(value)):
-            raise ValueError("chainages must increase from row to row")
-        speeds = [row[1] for row in value]
-    elif _finite(value):
-        speeds = [value]
-    else:
-        raise ValueError("must be a number or two or more rows [chainage_m, km/h]")
-    if not all(0.0 < speed <= 1000.0 for speed in speeds):
-        raise ValueError("must be greater than 0 and at most 1000 km/h")
-    return value
-
-
-def _channels(known: dict[str, Any]) -> BeforeValidator:
-    """Either "all" or names out of the known channels."""
-
-    def check(value: Any) -> Any:
-        if value == "all":
-            return tuple(known)
-        if not isinstance(value, tuple) or not all(isinstance(name, str) for name in value):
-            raise ValueError("must be 'all' or a list of channel names")
-        for name in value:
-            if name not in known:
-                raise ValueError(f"no such channel {name!r}; known: {', '.join(known)}")
-        return value
-
-    return BeforeValidator(check)
-
-
 class Train(Params):
     """What runs and how fast.
 
@@ -94,9 +44,9 @@ class Train(Params):
 
     vehicles: Annotated[tuple[Part, ...], Field(min_length=1)]
     coupler_pitch: float | tuple[float, ...] | None = Field(None, json_schema_extra={"unit": "m"})
-    speed_kmh: Annotated[float | tuple[tuple[float, float], ...], BeforeValidator(_check_speed)]
+    speed_kmh: Annotated[float | tuple[tuple[float, float], ...], BeforeValidator(check_speed)]
     distance: Annotated[float, Q("m", "way of the train", gt=0, le=1e6)]
-    start: Annotated[float | Literal["auto"], _number_or("auto", "m", 0.0, 1e7)] = "auto"
+    start: Annotated[float | Literal["auto"], number_or("auto", "m", 0.0, 1e7)] = "auto"
     wheel_profile: Part = "LMA"
     series_springs: bool = False
 
@@ -149,8 +99,8 @@ class Numerics(Params):
     """
 
     modes_per_metre: Annotated[float, Q("1/m", "trial functions per field and metre of window", ge=0.2, le=20)] = 6.5
-    window: Annotated[float | Literal["auto"], _number_or("auto", "m", 1.0, 2000.0)] = "auto"
-    time_step: Annotated[float | Literal["auto"], _number_or("auto", "s", 1e-6, 1e-3)] = "auto"
+    window: Annotated[float | Literal["auto"], number_or("auto", "m", 1.0, 2000.0)] = "auto"
+    time_step: Annotated[float | Literal["auto"], number_or("auto", "s", 1e-6, 1e-3)] = "auto"
     passes: Annotated[int, Q("-", "passes of the explicit half per step", ge=1, le=20)] = 2
     start: Literal["equilibrium", "zero"] = "equilibrium"
     mortar: Literal["implicit", "explicit"] = "implicit"
@@ -167,21 +117,13 @@ class Numerics(Params):
 class Output(Params):
     """What is written, and how often; intervals are rounded to whole steps."""
 
-    wheel_interval: Annotated[float | Literal["step"], _number_or("step", "s", 1e-6, 10.0)] = "step"
-    body_interval: Annotated[float | Literal["step"], _number_or("step", "s", 1e-6, 10.0)] = 1e-3
-    wheel_channels: Annotated[tuple[str, ...], _channels(WHEEL)] = tuple(WHEEL)
-    body_channels: Annotated[tuple[str, ...], _channels(BODY)] = tuple(BODY)
-    irregularity_channels: Annotated[tuple[str, ...], _channels(IRREGULARITY)] = tuple(IRREGULARITY)
+    wheel_interval: Annotated[float | Literal["step"], number_or("step", "s", 1e-6, 10.0)] = "step"
+    body_interval: Annotated[float | Literal["step"], number_or("step", "s", 1e-6, 10.0)] = 1e-3
+    wheel_channels: Annotated[tuple[str, ...], channel_names(WHEEL)] = tuple(WHEEL)
+    body_channels: Annotated[tuple[str, ...], channel_names(BODY)] = tuple(BODY)
+    irregularity_channels: Annotated[tuple[str, ...], channel_names(IRREGULARITY)] = tuple(IRREGULARITY)
     precision: Literal["single", "double"] = "single"
     run_in: Annotated[float, Q("m", "way that statistics leave out", ge=0)] = 50.0
-
-
-class Ensemble(Params):
-    """Many trains at once; reserved."""
-
-    size: Annotated[int, Field(ge=1)] = 1
-    seeds: tuple[int, ...] = ()
-    vary: tuple[str, ...] = ()
 
 
 class Scenario(Params):
@@ -201,6 +143,11 @@ class Scenario(Params):
     output: Output = Output()
     ensemble: Ensemble = Ensemble()
     presets: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
+
+    @cached_property
+    def members(self) -> tuple[Scenario, ...]:
+        """The scenario of every train of the ensemble, by itself; this one if it is alone."""
+        return _members(self)
 
     @cached_property
     def parts(self) -> Parts:
@@ -262,10 +209,75 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
         tables.setdefault("name", path.stem)
     tables = _absolute(apply_overrides(tables, overrides), folder)
     scenario = build(Scenario, tables)
+    ensemble = _absolute_vary(scenario.ensemble, folder)
     presets = collect_presets(scenario.train, scenario.track, scenario.presets, folder)
-    scenario = scenario.model_copy(update={"presets": presets})
+    if ensemble.vary:
+        for i in range(ensemble.size):
+            train = _changed(tables, ensemble, i)
+            presets |= collect_presets(train.train, train.track, presets, folder)
+    scenario = scenario.model_copy(update={"presets": presets, "ensemble": ensemble})
     _check(scenario)
+    _check_members(scenario)
     return scenario
+
+
+def _changed(tables: dict[str, Any], ensemble: Ensemble, train: int) -> Scenario:
+    """One train of an ensemble, from the tables of the whole."""
+    try:
+        return build(Scenario, apply_overrides({**tables, "ensemble": {}}, ensemble.changes(train)))
+    except InputError as error:
+        raise InputError(f"train {train} of the ensemble: {error}") from None
+
+
+def _members(scenario: Scenario) -> tuple[Scenario, ...]:
+    """Every train of an ensemble; trains that differ in their seed alone share parts."""
+    ensemble, first = scenario.ensemble, scenario.irregularity.seed
+    if ensemble == Ensemble():
+        return (scenario,)
+    tables = to_tuples(scenario.model_dump(exclude_none=True))
+    made: dict[str, Scenario] = {}
+    members = []
+    for i in range(ensemble.size):
+        key = repr(ensemble.changes(i))
+        if key not in made:
+            made[key] = _changed(tables, ensemble, i)
+        train = made[key]
+        if "irregularity.seed" not in ensemble.vary:
+            seeded = train.irregularity.model_copy(update={"seed": ensemble.seed(i, first)})
+            train = train.model_copy(update={"irregularity": seeded})
+        members.append(train)
+    return tuple(members)
+
+
+def _check_members(scenario: Scenario) -> None:
+    """Rules for every train of an ensemble."""
+    if scenario.ensemble.seeds and not any(_is_random(train.irregularity) for train in scenario.members):
+        raise InputError("ensemble.seeds: make no difference to a measured irregularity or to none; leave them out")
+    if scenario.irregularity.seed + scenario.ensemble.size > 2**63:
+        raise InputError(f"irregularity.seed = {scenario.irregularity.seed}: leaves no seeds for all trains")
+    checked: set[str] = set()
+    for i, train in enumerate(scenario.members):
+        changes = repr(scenario.ensemble.changes(i))
+        if changes not in checked:
+            checked.add(changes)
+            try:
+                _check(train)
+            except InputError as error:
+                raise InputError(f"train {i} of the ensemble: {error}") from None
+
+
+def _is_random(track: IrregularityParams) -> bool:
+    """Whether a seed makes a difference."""
+    return track.short_wave or (track.file is None and track.spectrum != "none")
+
+
+def _absolute_vary(ensemble: Ensemble, folder: Path | None) -> Ensemble:
+    """The ensemble with the paths of measured irregularities made absolute."""
+    files = ensemble.vary.get("irregularity.file")
+    if files is None:
+        return ensemble
+    found = tuple(_absolute({"irregularity": {"file": file}}, folder)["irregularity"]["file"] for file in files)
+    return ensemble.model_copy(update={"vary": {**ensemble.vary, "irregularity.file": found}})
 
 
 def _absolute(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
@@ -287,11 +299,7 @@ def to_toml(scenario: Scenario) -> str:
 
 
 def _check(scenario: Scenario) -> None:
-    """Rules that join several keys."""
-    if scenario.ensemble.size != 1:
-        raise InputError(
-            f"ensemble.size = {scenario.ensemble.size}: must be 1; several trains at once are not offered yet"
-        )
+    """Rules that join several keys of one train."""
     parts, window = scenario.parts, scenario.window_length
     least = parts.wheel_span + 2.0 * WINDOW_MARGIN_LEAST
     if window < least:

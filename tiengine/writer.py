@@ -3,7 +3,7 @@
 ::
 
     /                                   attributes: format, format_version, versions, scenario (TOML), ...
-    /trains/000                         attribute vehicles; time -> wheel/time
+    /trains/000                         attributes vehicles, seed, status, ...; time -> wheel/time
     /trains/000/wheel                   channels (time, wheelset, side), see tiengine.channels
     /trains/000/body                    channels (time, body, dof)
     /trains/000/irregularity            channels (time, wheelset, side)
@@ -23,6 +23,7 @@ import os
 import platform
 import uuid
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -34,14 +35,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.channels import DOFS, GROUPS, SIDES, Channel
+from tiengine.column import Column
 from tiengine.quantity import InputError
 from tiengine.results import FORMAT, FORMAT_VERSION, Result
 
-__all__ = ["GroupSpec", "TrainLabels", "Writer", "check_output"]
+__all__ = ["DTYPES", "Block", "GroupSpec", "TrainLabels", "Writer", "check_output"]
 
 Reals = NDArray[np.float64]
 
 CHUNK = 1000  # samples along time: a chunk of a coach's channel is 32 kB
+DTYPES = {"single": np.float32, "double": np.float64}
 PACKAGES = ("numpy", "scipy", "taichi", "h5py", "pydantic")
 
 
@@ -99,6 +102,21 @@ class GroupSpec:
         return cls(dimensions, {name: GROUPS[group][name] for name in names}, times_of)
 
 
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Samples of one group of one train.
+
+    Attributes:
+        time: Times [s], shape (n,); ignored where the group shares another one's.
+        position: Chainages of the first vehicle's centre [m], shape (n,); likewise.
+        channels: Every channel of the group, shape (n, *dimensions).
+    """
+
+    time: Reals
+    position: Reals
+    channels: Mapping[str, NDArray[Any]]
+
+
 def check_output(path: Path, force: bool = False) -> None:
     """Refuse a path that cannot become a result file, before anything is computed.
 
@@ -142,7 +160,7 @@ class Writer:
             path: Where the file shall be; None keeps it in memory.
             scenario_toml: Resolved scenario.
             attributes: Root attributes that are known at the beginning.
-            trains: Labels of every train.
+            trains: Labels of every train; more may be added later.
             groups: What each train records; a group comes after the one whose times it shares.
             precision: ``"single"`` or ``"double"`` for channels; time and position are double.
             force: Replace an existing file.
@@ -153,14 +171,15 @@ class Writer:
         self._finished = False
         self._path = path
         self._specs = dict(groups)
-        self._dtype = np.float32 if precision == "single" else np.float64
+        self._columns: dict[tuple[int, str], dict[str, Column]] = {}
+        self._dtype = DTYPES[precision]
         self._temporary = None if path is None else path.with_name(f".{path.name}.{os.getpid()}.part")
         self._file = self._create(force)
         try:
             self._file.attrs.update(_header(scenario_toml))
             self._file.attrs.update(attributes)
             for i, labels in enumerate(trains):
-                self._create_train(self._file.create_group(f"trains/{i:03d}"), labels)
+                self.add(i, labels)
         except BaseException:
             self.discard()
             raise
@@ -174,6 +193,39 @@ class Writer:
     ) -> None:
         """Remove the file unless it was closed."""
         self.discard()
+
+    def add(self, train: int, labels: TrainLabels | None, attributes: Mapping[str, Any] | None = None) -> None:
+        """Add a train to the file.
+
+        Args:
+            train: Its number.
+            labels: Its labels; None for one of which there is nothing to write.
+            attributes: Known at its beginning.
+        """
+        node = self._file.require_group(f"trains/{train:03d}")
+        if labels is not None:
+            self._create_train(node, labels)
+            for name, spec in self._specs.items():
+                grow = (*spec.channels, *(() if spec.times_of else ("time", "position")))
+                self._columns[train, name] = {key: Column(node[f"{name}/{key}"]) for key in grow}
+        node.attrs.update(attributes or {})
+
+    def describe(self, train: int, attributes: Mapping[str, Any]) -> None:
+        """Add attributes to a train of the file."""
+        self._file[f"trains/{train:03d}"].attrs.update(attributes)
+
+    def write(self, train: int, blocks: Mapping[str, Block]) -> None:
+        """Add samples to the groups of one train.
+
+        Args:
+            train: Index of the train.
+            blocks: Samples by group.
+
+        Raises:
+            InputError: The disk is full or gone.
+        """
+        for group, block in blocks.items():
+            self.append(train, group, block.time, block.position, block.channels)
 
     def append(
         self, train: int, group: str, time: Reals, position: Reals, channels: Mapping[str, NDArray[Any]]
@@ -191,7 +243,7 @@ class Writer:
             ValueError: A channel is missing, unknown, or of the wrong shape.
             InputError: The disk is full or gone.
         """
-        node = self._file[f"trains/{train:03d}/{group}"]
+        columns = self._columns[train, group]
         spec = self._specs[group]
         if set(channels) != set(spec.channels):
             odd = sorted(set(channels) ^ set(spec.channels))
@@ -200,14 +252,11 @@ class Writer:
         if spec.times_of is None:
             values |= {"time": time, "position": position}
         for name, value in values.items():
-            dataset = node[name]
-            expected = (len(time), *dataset.shape[1:])
+            expected = (len(time), *columns[name].rest)
             if value.shape != expected:
                 raise ValueError(f"{group}/{name}: shape {value.shape}, expected {expected}")
-            end = dataset.shape[0]
             try:
-                dataset.resize(end + len(time), axis=0)
-                dataset[end:] = value
+                columns[name].extend(value)
             except OSError as error:
                 raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
 
@@ -223,11 +272,12 @@ class Writer:
         Raises:
             InputError: The file could not be completed or moved to its place.
         """
-        self._file.attrs.update(attributes)
         if self._path is None or self._temporary is None:
+            self._file.attrs.update(attributes)
             self._finished = True
             return Result(self._file, "in memory")
         try:
+            self._file.attrs.update(attributes)
             self._file.close()
             os.replace(self._temporary, self._path)
         except (OSError, RuntimeError) as error:  # h5py says RuntimeError when the disk is full
@@ -240,17 +290,18 @@ class Writer:
         """Remove what was written, unless it was closed."""
         if self._finished:
             return
-        self._file.close()
+        with suppress(OSError, RuntimeError):  # a full disk once more
+            self._file.close()
         if self._temporary is not None:
             self._temporary.unlink(missing_ok=True)
 
     def _create(self, force: bool) -> Any:
         if self._path is None or self._temporary is None:
             name = f"tiengine-{uuid.uuid4()}"  # HDF5 refuses two open files of one name, in memory too
-            return h5py.File(name, "w", driver="core", backing_store=False)
+            return h5py.File(name, "w", driver="core", backing_store=False, rdcc_nbytes=0)
         check_output(self._path, force)
         try:
-            return h5py.File(self._temporary, "w")
+            return h5py.File(self._temporary, "w", rdcc_nbytes=0)  # else every open dataset holds 1 MB
         except OSError as error:
             raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
 

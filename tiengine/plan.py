@@ -1,0 +1,77 @@
+"""Which trains of an ensemble are advanced together.
+
+Trains that share everything but their irregularity share matrices, clock and seat phase: they form a group. A group is
+cut into tasks of equal size, the last filled up with copies of its last train, which are not written. Tasks follow
+from the scenario alone: BLAS adds in an order that depends on the number of right-hand sides, so that the bits of a
+train depend on how many stand beside it, but neither on which they are nor on who computes them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tiengine.irregularity import IrregularityParams, make_irregularity
+from tiengine.scenario import Scenario, to_toml
+
+__all__ = ["TRAINS_TOGETHER", "Task", "plan"]
+
+TRAINS_TOGETHER = 16
+"""Most trains advanced together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Trains that are advanced together.
+
+    Attributes:
+        scenario: The first train's; the others differ in their irregularity alone.
+        trains: Numbers of the trains in the ensemble.
+        tracks: Irregularity of every train, then of those that fill up the task.
+    """
+
+    scenario: Scenario
+    trains: tuple[int, ...]
+    tracks: tuple[IrregularityParams, ...]
+
+    @property
+    def size(self) -> int:
+        """Trains advanced together, those that fill up included."""
+        return len(self.tracks)
+
+
+def plan(scenario: Scenario, together: int = TRAINS_TOGETHER) -> tuple[Task, ...]:
+    """Cut an ensemble into tasks.
+
+    Args:
+        scenario: The whole ensemble.
+        together: Most trains in a task.
+
+    Raises:
+        InputError: A file of measured irregularity cannot be read.
+    """
+    members = scenario.members
+    groups: dict[str, list[int]] = {}
+    for i, train in enumerate(members):
+        groups.setdefault(_shared(train), []).append(i)
+    return tuple(task for group in groups.values() for task in _tasks(members, group, together))
+
+
+def _tasks(members: tuple[Scenario, ...], group: list[int], together: int) -> list[Task]:
+    """A group in tasks of equal size."""
+    count = math.ceil(len(group) / together)
+    size = math.ceil(len(group) / count)
+    tasks = []
+    for first in range(0, len(group), size):
+        trains = tuple(group[first : first + size])
+        filled = (*trains, *(trains[-1],) * (size - len(trains)))
+        tasks.append(Task(members[trains[0]], trains, tuple(members[i].irregularity for i in filled)))
+    return tasks
+
+
+def _shared(train: Scenario) -> str:
+    """Text that is the same for trains of one group: the irregularity's shortest wave matters to the time step."""
+    track = train.irregularity
+    shortest = track.shortest_wavelength if track.file is None else make_irregularity(track, 0.0).shortest_wavelength
+    rest = train.model_copy(update={"irregularity": IrregularityParams(), "presets": {}})
+    return f"{shortest!r}\n{to_toml(rest)}"

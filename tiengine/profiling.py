@@ -1,0 +1,251 @@
+"""Where the time of a scenario goes: the run's own loop with timers around the stages of the step.
+
+Means add up: the stages of a step, what is done once a chunk, and the rest (the loop itself) are the loop. The
+real-time factor is that of the blocks of steps without timers.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from taichi.lang import impl
+from threadpoolctl import threadpool_limits
+
+from tiengine.irregularity import make_irregularity
+from tiengine.kernels import layout as at
+from tiengine.machine import import_seconds, this_machine, versions
+from tiengine.memory import peak_memory
+from tiengine.plan import Task, plan
+from tiengine.prepare import prepare
+from tiengine.products import Work, count_products
+from tiengine.profile_report import Loop, Memory, ProfileReport, Rate, Stage, Wall
+from tiengine.quantity import InputError
+from tiengine.recorder import Recorder
+from tiengine.roofs import Roofs, measure_roofs
+from tiengine.scenario import Scenario, load_scenario, to_toml
+from tiengine.stage_split import mortar_us, suspension_us
+from tiengine.start import equilibrium, release
+from tiengine.state import State
+from tiengine.stepper import Chunk, Stepper
+from tiengine.timed_loop import CHUNK_STEPS, REST, StageTimers, TimedLoop, Times, shown
+from tiengine.writer import Writer
+
+__all__ = ["array_bytes", "profile"]
+
+WARM_UP_STEPS = 300
+
+HOME = {"mortar": "recording", "suspension": "fastening kernel"}
+"""Parts without a stage of their own, and the stage from whose time their estimate is taken off. A bed that is wholly
+implicit needs the mortar only where its pressures are recorded; any other is a stage."""
+
+ORDER = ("window and seats", "irregularity", "predictors", "linear forces", "motion at the seats", "fastening kernel",
+         "suspension", "mortar", "implicit solve", "contact", "recording", "checks", "writing")  # fmt: skip
+"""Rows of the table; stages unknown here come after."""
+
+
+def profile(
+    scenario: Scenario | str | Path | dict[str, Any],
+    *,
+    trains: int | None = None,
+    seconds: float = 1.0,
+    steps: int | None = None,
+) -> ProfileReport:
+    """Measure where the time of a scenario's loop goes.
+
+    Args:
+        scenario: What to run, as for :func:`tiengine.run`.
+        trains: Trains advanced together, with seeds that follow each other; by default
+            those that a run of the scenario would advance together.
+        seconds: Simulated time [s].
+        steps: Steps to measure instead, at least 2.
+
+    Returns:
+        The report.
+
+    Raises:
+        InputError: The scenario breaks a rule, or its way is too short.
+        RunFailedError: The train derailed or the numbers ran away.
+    """
+    scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    _check(trains, seconds, steps)
+    importing = import_seconds()
+    with threadpool_limits(1), ExitStack() as stack:
+        loop, wall = _set_up(
+            _task(scenario, trains), importing, Path(stack.enter_context(TemporaryDirectory(prefix="tiengine-")))
+        )
+        stack.callback(loop.writer.discard)
+        return _measure(loop, wall, max(2, round(seconds / loop.recorder.dt)) if steps is None else steps)
+
+
+def _check(trains: int | None, seconds: float, steps: int | None) -> None:
+    """Refuse what cannot be measured."""
+    if trains is not None and trains < 1:
+        raise InputError(f"trains = {trains}: must be at least 1")
+    if not 0.0 < seconds < np.inf:
+        raise InputError(f"seconds = {seconds:g}: must be greater than 0")
+    if steps is not None and steps < 2:
+        raise InputError(f"steps = {steps}: must be at least 2, with timers and without")
+
+
+def _task(scenario: Scenario, trains: int | None) -> Task:
+    """The trains to advance together: the first that a run would, or so many like the first with seeds that follow."""
+    task = plan(scenario)[0]
+    if trains is None:
+        return task
+    own = task.tracks[0]
+    tracks = tuple(own.model_copy(update={"seed": own.seed + b}) for b in range(trains))
+    return Task(task.scenario, tuple(range(trains)), tracks)
+
+
+def _set_up(task: Task, importing: float, folder: Path) -> tuple[TimedLoop, Wall]:
+    """Everything before the loop, as a run does it."""
+    started = time.perf_counter()
+    scenario = task.scenario
+    model, jit = prepare(scenario, trains=task.size)
+    recorder = Recorder(scenario, model.given.newmark.dt)
+    state, first = State.at_rest(model), scenario.rear + model.centre_s
+    if scenario.numerics.start == "equilibrium":
+        equilibrium(model, state, scenario.rear, *scenario.train.speed.at(first))
+    else:
+        release(model, state, scenario.rear)
+    rows = (CHUNK_STEPS // every + 1 for every in (recorder.wheel_every, recorder.body_every))
+    parallel = scenario.numerics.threads > 1 and task.size > 1
+    stepper = Stepper(model, state, Chunk.empty(model, CHUNK_STEPS, *rows), parallel=parallel)
+    jit += stepper.compile()
+    lead = scenario.rear + float(model.wheel_s.max())
+    tracks = [make_irregularity(track, lead) for track in task.tracks]
+    labels = [recorder.labels(model.given.train, model.given.slots)] * task.size
+    precision = scenario.output.precision
+    writer = Writer(folder / "profile.h5", to_toml(scenario), {}, labels, recorder.groups(), precision)
+    end = first + scenario.train.distance
+    loop = TimedLoop(scenario, stepper, StageTimers(stepper), recorder, writer, tracks, first, end)
+    generation = float(impl.get_runtime().prog.get_total_compilation_time())
+    setup = time.perf_counter() - started - jit
+    return loop, Wall(import_s=importing, jit_s=jit, code_generation_s=generation, setup_s=setup)
+
+
+def _measure(loop: TimedLoop, wall: Wall, steps: int) -> ProfileReport:
+    """Warm up, measure, estimate, count."""
+    warm_up = min(WARM_UP_STEPS, max(2, steps))
+    loop.advance(warm_up)
+    times = loop.advance(steps)
+    model, state, chunk = loop.stepper.model, loop.stepper.state, loop.stepper.chunk
+    memory = Memory(peak_memory(), *(array_bytes(each) * 1e-6 for each in (model, state, chunk)))
+    parts = _parts(loop)
+    work = count_products(model, state, chunk, lambda stepper: replace(loop, stepper=stepper).load(1))
+    machine = this_machine()
+    roofs = measure_roofs(machine.l2_bytes, machine.l3_bytes)
+    trains, dt = int(model.dims[at.TRAINS]), loop.recorder.dt
+    per_chunk = sum(times.chunks.values()) / steps
+    factor = (times.plain_ns / times.plain_steps + per_chunk) * 1e-9 / dt
+    loop_us = (times.timed_ns / times.timed_steps + per_chunk) * 1e-3 / trains
+    p50, p90, p99 = np.percentile(times.timed, (50, 90, 99)) * 1e-3
+    return ProfileReport(
+        scenario=loop.scenario.name,
+        trains=trains,
+        time_step_s=dt,
+        passes=model.given.passes,
+        dofs=model.dof_counts["total"],
+        warm_up_steps=warm_up,
+        steps=steps,
+        versions=versions(),
+        machine=machine,
+        wall=wall,
+        loop=Loop(
+            real_time_factor=factor,
+            real_time_factor_per_train=factor / trains,
+            steps_per_s=1.0 / (factor * dt),
+            us_per_train_step=loop_us,
+            step_us_p50=float(p50),
+            step_us_p90=float(p90),
+            step_us_p99=float(p99),
+            step_us_max=max(times.timed) * 1e-3,
+            measuring_overhead=float(np.median([timed / plain for timed, plain in times.blocks])) - 1.0,
+        ),
+        stages=_stages(times, parts, trains, loop_us),
+        memory=memory,
+        roofs=roofs,
+        rates=_rates(times, work, roofs),
+    )
+
+
+def _parts(loop: TimedLoop) -> dict[str, tuple[float, float]]:
+    """Calls a step and time [us a train-step] of parts that share a stage with others."""
+    model, state = loop.stepper.model, loop.stepper.state
+    mortar = 1.0 / loop.recorder.body_every
+    suspension = loop.timers.calls.get(HOME["suspension"], 0)
+    return {
+        "mortar": (mortar, mortar * mortar_us(model, state)),
+        "suspension": (suspension, suspension * suspension_us(model, state)),
+    }
+
+
+def _stages(times: Times, parts: dict[str, tuple[float, float]], trains: int, loop_us: float) -> tuple[Stage, ...]:
+    """Rows of the table; they add up to the loop."""
+    steps = times.timed_steps + times.plain_steps
+    chunks = np.ceil(steps / CHUNK_STEPS) / steps
+    us = {name: ns * 1e-3 / (times.timed_steps * trains) for name, ns in times.stages.items()}
+    calls: dict[str, float] = {**times.calls}
+    for name, ns in times.chunks.items():
+        us[name] = us.get(name, 0.0) + ns * 1e-3 / (steps * trains)
+        calls[name] = calls.get(name, 0.0) + chunks
+    estimated = set()
+    for part, (count, time_us) in parts.items():
+        if part not in us and HOME[part] in us:  # else it is a stage of its own
+            us[part], calls[part] = time_us, count
+            us[HOME[part]] -= time_us
+            estimated |= {part, HOME[part]}
+    us[REST] = 0.0
+    us[REST] = loop_us - sum(us.values())
+    names = sorted(us, key=lambda name: (name == REST, ORDER.index(name) if name in ORDER else len(ORDER)))
+    return tuple(
+        Stage(name, float(calls.get(name, 1.0)), us[name], us[name] / loop_us, name in estimated) for name in names
+    )
+
+
+def _rates(times: Times, work: dict[str, Work], roofs: Roofs) -> tuple[Rate, ...]:
+    """Matrix products of each stage over the time that the stage took."""
+    stages: dict[str, Work] = {}
+    for name, each in work.items():
+        stages[shown(name)] = stages.get(shown(name), Work()) + each
+    seconds = {name: times.stages[name] * 1e-9 / times.timed_steps for name in stages}
+    return tuple(
+        Rate(
+            stage=name,
+            products_per_step=each.products,
+            flops_per_step=each.flops,
+            bytes_per_step=each.traffic,
+            gflops=each.flops / seconds[name] * 1e-9,
+            gb_per_s=each.traffic / seconds[name] * 1e-9,
+            of_roof=roofs.floor_s(each.flops, each.read) / seconds[name],
+        )
+        for name, each in stages.items()
+    )
+
+
+def array_bytes(data: Any) -> int:
+    """Bytes of the NumPy arrays that an object of dataclasses, mappings and sequences holds, each counted once."""
+    seen: dict[int, int] = {}
+
+    def look(value: Any) -> None:
+        if isinstance(value, np.ndarray):
+            owner = value if value.base is None or not isinstance(value.base, np.ndarray) else value.base
+            seen[id(owner)] = owner.nbytes
+        elif is_dataclass(value):
+            for each in fields(value):
+                look(getattr(value, each.name))
+        elif isinstance(value, dict):
+            for each in value.values():
+                look(each)
+        elif isinstance(value, (tuple, list)):
+            for each in value:
+                look(each)
+
+    look(data)
+    return sum(seen.values())

@@ -1,0 +1,74 @@
+"""Estimates for parts of the step that share a launch with others and cannot be timed in it.
+
+Mortar and suspension run alone, by their stand-alone kernels, on the live state of one train copied many times: the
+difference between many copies and one, over their number, is free of the cost of a public launch. Caches are warmer
+than in the step.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from tiengine.kernels import layout as at
+from tiengine.kernels.mortar import add_bed_forces
+from tiengine.kernels.suspension import suspension_forces
+from tiengine.model import Model
+from tiengine.state import State
+
+__all__ = ["mortar_us", "suspension_us"]
+
+SLAB_COPIES, TRAIN_COPIES = 65, 501  # near a second-level cache's size; below the 512 that Taichi gives one thread
+REPEATS = 40
+
+
+def mortar_us(model: Model, state: State) -> float:
+    """One evaluation of the bed under one train's slabs [us]."""
+    slots, n = int(model.dims[at.SLOTS]), int(model.dims[at.SLAB_DOFS])
+    k, c, explicit, no_tension = model.bed_numbers
+    slabs = np.stack([state.view(row, "slabs")[0].ravel() for row in (at.U, at.V, at.F)])
+    start = np.arange(slots, dtype=np.int32) * n
+
+    def evaluate(trains: int) -> Callable[[], object]:
+        design, motion = np.repeat(state.design[:1], trains, axis=0), np.tile(slabs, trains)
+        pressure = np.zeros((trains, slots, 2))
+        return lambda: add_bed_forces(
+            trains, slots * n, n, start, design, model.bed_index, model.bed_shape, model.bed_weight, model.bed_factor,
+            model.bed_rest, model.bed_lateral_K, model.bed_lateral_C, k, c, int(explicit), int(no_tension), motion,
+            pressure,
+        )  # fmt: skip
+
+    return _by_difference(evaluate, SLAB_COPIES)
+
+
+def suspension_us(model: Model, state: State) -> float:
+    """One evaluation of one train's nonlinear elements [us]."""
+    train = model.given.train
+    motion = np.stack([state.view(row, "vehicles")[0] for row in (at.U, at.V, at.F)])
+
+    def evaluate(trains: int) -> Callable[[], object]:
+        many = np.tile(motion, trains)
+        return lambda: suspension_forces(
+            train.n, train.element_index, train.element_row, train.element_kind, train.element_linear,
+            train.element_table, many,
+        )  # fmt: skip
+
+    return _by_difference(evaluate, TRAIN_COPIES)
+
+
+def _by_difference(evaluate: Callable[[int], Callable[[], object]], copies: int) -> float:
+    """Time of one copy [us]: median of many copies' launches less that of one copy's, taken in turn."""
+    clock = time.perf_counter_ns
+    calls = evaluate(1), evaluate(copies)
+    for call in calls:
+        call()  # the first launch compiles
+    taken = np.empty((REPEATS, 2))
+    for row in taken:
+        for i, call in enumerate(calls):
+            start = clock()
+            call()
+            row[i] = clock() - start
+    one, many = np.median(taken, axis=0)
+    return max(0.0, float(many - one) / (copies - 1) * 1e-3)
