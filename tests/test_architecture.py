@@ -16,7 +16,7 @@ LAYERS = [
      "irregularity", "defects"},
     {"parts", "scenario"},
     {"integrator", "blocks", "model"},
-    {"state", "track_static"},
+    {"state", "scratch", "track_static"},
     {"stepper", "start", "setup"},
     {"results", "writer", "recorder", "events", "stability"},
     {"simulate"},
