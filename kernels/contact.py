@@ -2,24 +2,29 @@
 
 At the end of a step the coordinates a wheel feels are x = x_free + S q with q the contact's generalised forces, because
 the rest of the step is linear: S = beta dt^2 A^-1 for displacements, gamma dt A^-1 for rates. Wheels stand still in
-the window, so S is constant. The wheels of one wheelset are solved together; all the others enter x_free with their
-forces of the pass before. Newton's method finds the forces f = (N, Fx, Fy) of both wheels of a wheelset with
+the window, so S is constant. The wheels of one wheelset are solved together; all the others enter x_free with the
+forces they have by then. Newton's method finds the forces f = (N, Fx, Fy) of both wheels of a wheelset with
 
     f = law(e),  e = (delta, creepages)(x_free + S B f)
 
 The Jacobian is I - D W with D = d law / d e and W = H S B; it leaves out how the geometry changes along the step, which
 the residual does not. A step that does not bring the forces nearer to the law is halved: at low speed saturating
-creepage would otherwise send the iterates to and fro.
+creepage would otherwise send the iterates to and fro. The steps shrink by a nearly constant factor, so that the last
+one times the last factor is what is left, and the iteration ends when that is small enough.
 """
 
 import taichi as ti
 
 from tiengine.kernels import layout as at
+from tiengine.kernels import under_wheels as uw
 from tiengine.kernels import wheel_rail as wr
 from tiengine.kernels.types import Array, Reals1, Reals2, Reals3, Reals4, Template
 
 ITERATIONS = 50
 SMALLEST_SHARE = 1.0 / 128.0  # of a Newton step: below it the step is taken as it is
+ITERATE_TOLERANCE = 0.02
+"""Of the static load, in all passes but the last: so small a Newton step leaves a hundredth of itself, and a pass takes
+that down tenfold. One iteration a wheelset does then, as a rule."""
 
 
 @ti.func
@@ -41,53 +46,12 @@ def solve6(matrix: Template, rhs: Template):
 
 
 @ti.func
-def wheelset_coordinates(b: int, wheelset: int, dims: Array, dof: Array, row: int, motion: Array):
-    """Wheelset y, z, roll, pitch, yaw from a row of the motion."""
-    base = dims[at.VEHICLES] + b * dims[at.VEHICLE_DOFS]
-    x = ti.Vector.zero(ti.f64, 5)
-    for m in ti.static(range(5)):
-        x[m] = motion[row, base + dof[wheelset, m]]
-    return x
-
-
-@ti.func
-def rail_coordinates(b: int, wheelset: int, rail: int, dims: Array, shape: Array, motion: Array, rail_out: Array):
-    """Rail under a wheel, into ``rail_out[b, wheelset, rail]``: w, v, theta_x, slopes, rates at constant s."""
-    n = dims[at.MODES]
-    w = (b * 2 + rail) * 2 * n
-    v = dims[at.LATERAL] + (b * 2 + rail) * 3 * n
-    for field in ti.static(range(3)):
-        base = w
-        if ti.static(field == 1):
-            base = v
-        elif ti.static(field == 2):
-            base = v + 2 * n
-        value, slope, rate = 0.0, 0.0, 0.0
-        for i in range(n):
-            value += shape[0, wheelset, i] * motion[at.U, base + i]
-            slope += shape[1, wheelset, i] * motion[at.U, base + i]
-            rate += shape[0, wheelset, i] * motion[at.V, base + i]
-        rail_out[b, wheelset, rail, field] = value
-        rail_out[b, wheelset, rail, 3 + field] = slope
-        rail_out[b, wheelset, rail, 6 + field] = rate
-
-
-@ti.func
 def stored_place(b: int, wheelset: int, side: Template, contact: Array):
     """Contact geometry of a wheel as the last evaluation left it."""
     place = ti.Vector.zero(ti.f64, 5)
     for m in ti.static(range(5)):
         place[m] = contact[b, wheelset, side, wr.SIN + m]
     return place
-
-
-@ti.func
-def stored_rail(b: int, wheelset: int, side: Template, rail: Array):
-    """Rail motion under a wheel: w, v, theta_x, slopes, rates at constant s."""
-    r = ti.Vector.zero(ti.f64, 9)
-    for m in ti.static(range(9)):
-        r[m] = rail[b, wheelset, side, m]
-    return r
 
 
 @ti.func
@@ -118,7 +82,7 @@ def store_force(
 
 
 @ti.func
-def rail_at_end(wheelset: int, free: Template, force: Template, before: Template, constants: Array, compliance: Array):
+def rail_at_end(wheelset: int, free: Template, force: Template, before: Template, constants: Array, coupling: Array):
     """Rail motion under a wheel at the end of the step, from that without the change of the wheel's force.
 
     The modes left out answer to the whole force at once, without inertia; that they have rates is neglected.
@@ -128,8 +92,8 @@ def rail_at_end(wheelset: int, free: Template, force: Template, before: Template
     for m in ti.static(range(3)):
         value, slope = 0.0, 0.0
         for k in ti.static(range(3)):
-            value += compliance[wheelset, 0, m, k] * increment[k]
-            slope += compliance[wheelset, 1, m, k] * increment[k]
+            value += coupling[wheelset, 0, wheelset, m, k] * increment[k]
+            slope += coupling[wheelset, 1, wheelset, m, k] * increment[k]
         r[m] += constants[at.BETA_DT2] * value
         r[3 + m] += constants[at.BETA_DT2] * slope
         r[6 + m] += constants[at.GAMMA_DT] * value
@@ -163,7 +127,7 @@ def state_of(
 @ti.func
 def feedback(
     same: Template, wheelset: int, V: float, constants: Array, D: Template, B: Template, R: Template,
-    other: Template, cos: float, wheelset_compliance: Array, rail_compliance: Array,
+    other: Template, cos: float, wheelset_compliance: Array, rail_coupling: Array,
 ):  # fmt: skip
     """D W for (N, Fx, Fy): what the law of one wheel answers to unit forces of itself (``same``) or of the other wheel.
 
@@ -177,10 +141,10 @@ def feedback(
             for k in ti.static(range(3)):
                 total += B[k, 2 * m] * wheelset_compliance[wheelset, k, k] * other[k, 2 * n]
             if ti.static(same == 1):
-                total += R[0, 2 * m] * rail_compliance[wheelset, 0, 0, 0] * R[0, 2 * n]
+                total += R[0, 2 * m] * rail_coupling[wheelset, 0, wheelset, 0, 0] * R[0, 2 * n]
                 for k in ti.static(range(1, 3)):
                     for l in ti.static(range(1, 3)):
-                        total += R[k, 2 * m] * rail_compliance[wheelset, 0, k, l] * R[l, 2 * n]
+                        total += R[k, 2 * m] * rail_coupling[wheelset, 0, wheelset, k, l] * R[l, 2 * n]
             if ti.static(m == 0):
                 W[m, n] = -constants[at.BETA_DT2] * total  # a wheel pushed up penetrates less
                 if ti.static(same == 1):
@@ -205,13 +169,13 @@ def feedback(
 def newton_step(
     wheelset: int, V: float, constants: Array, residual: Template, D_l: Template, D_r: Template, B_l: Template,
     B_r: Template, R_l: Template, R_r: Template, cos_l: float, cos_r: float, wheelset_compliance: Array,
-    rail_compliance: Array,
+    rail_coupling: Array,
 ):  # fmt: skip
     """Solve (I - D W) step = residual for (N, Fx, Fy) of the left, then of the right wheel."""
-    ll = feedback(1, wheelset, V, constants, D_l, B_l, R_l, B_l, cos_l, wheelset_compliance, rail_compliance)
-    lr = feedback(0, wheelset, V, constants, D_l, B_l, R_l, B_r, cos_l, wheelset_compliance, rail_compliance)
-    rl = feedback(0, wheelset, V, constants, D_r, B_r, R_r, B_l, cos_r, wheelset_compliance, rail_compliance)
-    rr = feedback(1, wheelset, V, constants, D_r, B_r, R_r, B_r, cos_r, wheelset_compliance, rail_compliance)
+    ll = feedback(1, wheelset, V, constants, D_l, B_l, R_l, B_l, cos_l, wheelset_compliance, rail_coupling)
+    lr = feedback(0, wheelset, V, constants, D_l, B_l, R_l, B_r, cos_l, wheelset_compliance, rail_coupling)
+    rl = feedback(0, wheelset, V, constants, D_r, B_r, R_r, B_l, cos_r, wheelset_compliance, rail_coupling)
+    rr = feedback(1, wheelset, V, constants, D_r, B_r, R_r, B_r, cos_r, wheelset_compliance, rail_coupling)
     J = ti.Matrix.identity(ti.f64, 6)
     for m in ti.static(range(3)):
         for n in ti.static(range(3)):
@@ -224,34 +188,31 @@ def newton_step(
 
 @ti.func
 def solve_wheelset(
-    b: int, wheelset: int, V: float, irregularity: Template, dims: Array, constants: Array, wheel: Array, dof: Array,
-    table: Array, wheelset_compliance: Array, rail_compliance: Array, motion: Array, rail_free: Array, contact: Array,
-    force: Array, wheelset_force: Array, rail_force: Array, wheelset_before: Array, rail_before: Array,
+    b: int, wheelset: int, V: float, x_free: Template, dx_free: Template, free_l: Template, free_r: Template,
+    irregularity: Template, dims: Array, constants: Array, wheel: Array, table: Array, wheelset_compliance: Array,
+    rail_coupling: Array, contact: Array, force: Array, wheelset_force: Array, rail_force: Array, tolerance: float,
 ):  # fmt: skip
-    """Newton's method for the local forces of one wheelset; returns the number of iterations.
+    """Newton's method for the local forces of one wheelset, to a tolerance [N]; returns the number of iterations.
 
-    Unknowns are N, Fx, Fy of both wheels; the small spin moments follow the law from one iteration to the next.
+    Unknowns are N, Fx, Fy of both wheels; the small spin moments follow the law from one iteration to the next. The
+    free motions of wheelset and rails (left, right) hold what the forces found here before would do.
 
     Everything that changes from one iteration to the next is local: Taichi 1.7.4 takes a load with a literal index
     and a store with a running one for different places and moves the load out of the loop.
     """
-    x_free = wheelset_coordinates(b, wheelset, dims, dof, at.U, motion)
-    dx_free = wheelset_coordinates(b, wheelset, dims, dof, at.V, motion)
-    free_l, free_r = stored_rail(b, wheelset, 0, rail_free), stored_rail(b, wheelset, 1, rail_free)
-    before_l, before_r = stored_force(b, wheelset, 0, 3, rail_before), stored_force(b, wheelset, 1, 3, rail_before)
+    before_l, before_r = stored_force(b, wheelset, 0, 3, rail_force), stored_force(b, wheelset, 1, 3, rail_force)
     before = ti.Vector.zero(ti.f64, 5)
     for m in ti.static(range(5)):
-        before[m] = wheelset_before[b, wheelset, m]
+        before[m] = wheelset_force[b, wheelset, m]
     f_l, f_r = stored_force(b, wheelset, 0, 4, force), stored_force(b, wheelset, 1, 4, force)
     place_l, place_r = stored_place(b, wheelset, 0, contact), stored_place(b, wheelset, 1, contact)
     r0, b0, h_r = wheel[wheelset, 0], wheel[wheelset, 1], constants[at.ARM_HEAD]
     rolls = dims[at.CROSS_LEVEL_ROLLS]
-    tolerance = constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD]
     iterations = 0
-    change = 2.0 * tolerance
+    remains, change = 2.0 * tolerance, 0.0
     share, best = 1.0, 1e300
     base_l, base_r, step = f_l, f_r, ti.Vector.zero(ti.f64, 6)
-    while change > tolerance and iterations < ITERATIONS:
+    while remains > tolerance and iterations < ITERATIONS:
         B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, place_l)
         B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, place_r)
         increment = B_l @ f_l + B_r @ f_r - before
@@ -261,8 +222,8 @@ def solve_wheelset(
                 a[m] += wheelset_compliance[wheelset, m, k] * increment[k]
         x = x_free + constants[at.BETA_DT2] * a
         dx = dx_free + constants[at.GAMMA_DT] * a
-        rail_l = rail_at_end(wheelset, free_l, R_l @ f_l, before_l, constants, rail_compliance)
-        rail_r = rail_at_end(wheelset, free_r, R_r @ f_r, before_r, constants, rail_compliance)
+        rail_l = rail_at_end(wheelset, free_l, R_l @ f_l, before_l, constants, rail_coupling)
+        rail_r = rail_at_end(wheelset, free_r, R_r @ f_r, before_r, constants, rail_coupling)
         left = state_of(0, V, r0, b0, x, dx, rail_l, irregularity, rolls, table, constants)
         right = state_of(1, V, r0, b0, x, dx, rail_r, irregularity, rolls, table, constants)
         store_state(b, wheelset, 0, left, contact)
@@ -280,11 +241,14 @@ def solve_wheelset(
         else:
             step = newton_step(
                 wheelset, V, constants, residual, D_l, D_r, B_l, B_r, R_l, R_r, left[wr.COS], right[wr.COS],
-                wheelset_compliance, rail_compliance,
+                wheelset_compliance, rail_coupling,
             )  # fmt: skip
             share, best = 1.0, size
             base_l, base_r = f_l, f_r
-            change = ti.abs(step).max()
+            last, change = change, ti.abs(step).max()
+            remains = change
+            if change < last:
+                remains = change * (change / last)
         for m in ti.static(range(3)):
             f_l[m] = base_l[m] + share * step[m]
             f_r[m] = base_r[m] + share * step[3 + m]
@@ -364,10 +328,30 @@ def wheel_forces(
                 x[m] = wheelset_u[b, w, m]
                 dx[m] = wheelset_v[b, w, m]
             left = state_of(
-                0, V, wheel[w, 0], wheel[w, 1], x, dx, stored_rail(b, w, 0, rail_motion), felt, rolls, table, constants
+                0,
+                V,
+                wheel[w, 0],
+                wheel[w, 1],
+                x,
+                dx,
+                uw.stored_rail(b, w, 0, rail_motion),
+                felt,
+                rolls,
+                table,
+                constants,
             )
             right = state_of(
-                1, V, wheel[w, 0], wheel[w, 1], x, dx, stored_rail(b, w, 1, rail_motion), felt, rolls, table, constants
+                1,
+                V,
+                wheel[w, 0],
+                wheel[w, 1],
+                x,
+                dx,
+                uw.stored_rail(b, w, 1, rail_motion),
+                felt,
+                rolls,
+                table,
+                constants,
             )
             f_l, _ = wr.contact_law(left, constants[at.FRICTION])
             f_r, _ = wr.contact_law(right, constants[at.FRICTION])

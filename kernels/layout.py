@@ -6,13 +6,12 @@ lateral ones (train, rail, v, theta_z, theta_x), the slabs (train, slot, DOF) an
 is the outermost index of every block, so each block is a contiguous right-hand side for a matrix product.
 """
 
-# Rows of ``motion``.
+# Rows of ``motion``. The predictors are a product of rows U, V, A, the correctors one of A and the predictors.
 U, V, A = 0, 1, 2  # displacement, velocity, acceleration: at t_n between steps, the iterate at t_{n+1} within one
 U_PREDICTED, V_PREDICTED = 3, 4  # Newmark predictors of t_{n+1}
-LINEAR = 5  # -(C v + K u) of the linear part at the predictors
+LINEAR = 5  # what C v + K u at the predictors does: force -(C v + K u) of the rails, acceleration of slabs and vehicles
 F = 6  # right-hand side of the implicit solve
-X = 7  # its solution: acceleration without the contact forces
-MOTION_ROWS = 8
+MOTION_ROWS = 7
 
 # Entries of ``dims`` (int32): sizes and offsets.
 (
@@ -27,21 +26,22 @@ MOTION_ROWS = 8
     LATERAL,  # offset of the lateral rail blocks
     SLABS,  # offset of the slab blocks
     VEHICLES,  # offset of the vehicle blocks
-    HALF_BAND,
     BODIES,
     MORTAR_MODE,  # 0 bed wholly implicit, 1 only its no-tension deviation explicit, 2 wholly explicit
     CROSS_LEVEL_ROLLS,  # 1: a cross level turns the railheads, 0: it only shifts them
     N_DIMS,
-) = range(16)
+) = range(15)
 
 # Entries of ``constants`` (float64).
 (
     DT,
     BETA_DT2,  # beta dt^2
     GAMMA_DT,  # gamma dt
-    HALF_BETA_DT2,  # (1/2 - beta) dt^2
-    HALF_GAMMA_DT,  # (1 - gamma) dt
     LENGTH,  # window [m]
+    MASS,  # of the rail per length, then rho Iy, rho Iz, rho (Iy + Iz)
+    INERTIA_Y,
+    INERTIA_Z,
+    INERTIA_X,
     K_VERTICAL,
     C_VERTICAL,
     K_LATERAL,
@@ -65,13 +65,13 @@ MOTION_ROWS = 8
     RESIDUAL_TORSION,
     ABSORBING_ZONE,  # length of the zone with dampers to the ground at either end of the window [m]; zero for none
     N_CONSTANTS,
-) = range(29)
+) = range(31)
 
 # Columns of ``clock[step, :]`` (float64): the window at t_{n+1}.
 (POSITION, SPEED, SPEED_RATE, FIRST_SEAT_S, FIRST_SEAT, FIRST_SLAB, N_CLOCK) = range(7)
 
 # Entries of ``tick`` (int32): what the launch is to do.
-(STEP, PASS, LAST_PASS, WHEEL_RECORD, BODY_RECORD, N_TICK) = range(6)
+(STEP, PASS, LAST_PASS, WHEEL_RECORD, N_TICK) = range(5)
 
 # Channels of the irregularity at a wheelset: track values and their slopes along x.
 (Z_V, Y_A, CROSS_LEVEL, GAUGE, Z_V_SLOPE, Y_A_SLOPE, CROSS_LEVEL_SLOPE, GAUGE_SLOPE, N_IRREGULARITY) = range(9)

@@ -17,7 +17,7 @@ LAYERS = [
      "irregularity", "defects"},
     {"parts", "ensemble", "scenario"},
     {"integrator", "blocks", "model", "plan"},
-    {"state", "track_static"},
+    {"state", "scratch", "track_static"},
     {"stepper", "start", "setup"},
     {"results", "writer", "recorder", "events", "stability", "prepare", "products", "stage_split", "timed_loop"},
     {"march", "worker", "gather"},

@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from tiengine.integrator import Newmark, inverse, seat_inverse_terms, slab_operator
+from tiengine.integrator import Newmark, inverse, seat_inverse_terms, seat_shapes
 from tiengine.kernels import layout as at
 from tiengine.model import Model
 from tiengine.quantity import InputError
@@ -41,18 +41,7 @@ def test_blocks_are_inverses(model: Model) -> None:
 def test_slab_block_is_an_inverse(model: Model) -> None:
     """Slab with bed and its own side of the fastenings."""
     g, slab, dt = model.given, model.given.designs.matrices[0], 1e-4
-    own_K, own_C = (
-        x.toarray()
-        for x in seat_inverse_terms(
-            slab.n,
-            slab.seat_index,
-            np.stack([slab.seat_w, slab.seat_slope]),
-            slab.seat_x,
-            np.ones((9, 2)),
-            g.fastening,
-            g.rail.half_base,
-        )
-    )
+    own_K, own_C = seat_inverse_terms(seat_shapes(slab), np.ones((9, 2)), g.fastening, g.rail.half_base)
     rigid = np.zeros(slab.n)
     rigid[: slab.n - 2 : 3] = 1.0
     assert abs(rigid @ own_K @ rigid / (18 * g.fastening.vertical_stiffness) - 1.0) < 1e-12
@@ -74,17 +63,6 @@ def test_inverse() -> None:
     A = la.hilbert(12)  # condition 2e16
     with pytest.raises(InputError, match="test block"):
         inverse(sp.csc_array(A), "test")
-
-
-def test_slab_operator_keeps_its_band() -> None:
-    """Diagonals in order; an entry outside is an error, not lost."""
-    K, C = np.diag(np.arange(1.0, 6.0)) + np.diag(np.ones(4), 1), np.diag(np.ones(4), -1)
-    band = slab_operator(K, C, 1)
-    np.testing.assert_array_equal(band[0, :, 1], np.arange(1.0, 6.0))
-    np.testing.assert_array_equal(band[0, :4, 2], 1.0)
-    np.testing.assert_array_equal(band[1, 1:, 0], 1.0)
-    with pytest.raises(ValueError, match="band"):
-        slab_operator(np.ones((5, 5)), C, 3)
 
 
 def rail_period_error(dt: float) -> float:

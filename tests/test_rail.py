@@ -8,12 +8,13 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
-from tiengine.kernels import rail as kernels
 from tiengine.presets import find_preset, load_toml
 from tiengine.quantity import build
 from tiengine.rail import Rail, RailWindow, sine_products
+from tiengine.state import State, positions
 
-from .models import V350
+from .explicit import Explicit
+from .models import V350, paper_model
 from .reference.moving_load import Bed, deflection
 
 V_RATE = -3.0  # m/s^2: an emergency brake doubled
@@ -169,29 +170,41 @@ def test_energy_of_free_motion() -> None:
     assert abs(gained) > 1e-5 * before  # the balance is not empty
 
 
-def test_kernel_against_host() -> None:
-    """The kernel's -(C v + K u) is that of the sparse matrices, two trains, speed changing."""
-    window, B, n = RailWindow(chn60(), 36.0, 24), 2, 24
-    dims = np.zeros(at.N_DIMS, dtype=np.int32)
-    dims[at.TRAINS], dims[at.MODES], dims[at.LATERAL] = B, n, B * 4 * n
-    constants = np.zeros(at.N_CONSTANTS)
-    constants[at.LENGTH] = 36.0
+def test_step_against_host() -> None:
+    """What a step has for C v + K u is that of the sparse matrices; two trains, speed changing.
+
+    Rails: the force. Slabs and trains: the acceleration, that is after the implicit operator.
+    """
+    model = paper_model(modes=24, trains=2)
+    state, g = State.at_rest(model), model.given
+    clock = positions(model, np.array([33.3]), np.array([V350]), np.array([V_RATE])).clock
+    state.enter(model, int(clock[0, at.FIRST_SEAT]), int(clock[0, at.FIRST_SLAB]))
     rng = np.random.default_rng(3)
-    motion = np.zeros((at.MOTION_ROWS, B * 10 * n))
-    u = motion[at.U_PREDICTED] = 1e-3 * rng.standard_normal(B * 10 * n)
-    v = motion[at.V_PREDICTED] = rng.standard_normal(B * 10 * n)
-    kernels.rail_forces(
-        V350, V_RATE, dims, constants, window.modal_stiffness, window.modal_masses, sine_products(n), motion
-    )
-    for start, count, (_, C, K) in (
-        (0, 2 * n, window.vertical(V350, V_RATE)),
-        (B * 4 * n, 3 * n, window.lateral(V350, V_RATE)),
+    state.motion[at.U_PREDICTED] = 1e-3 * rng.standard_normal(state.motion.shape[1])
+    state.motion[at.V_PREDICTED] = rng.standard_normal(state.motion.shape[1])
+    Explicit(model, state, clock).first()
+
+    def rows(block: str) -> list[NDArray[np.float64]]:
+        views = (state.view(row, block) for row in (at.U_PREDICTED, at.V_PREDICTED, at.LINEAR))
+        return [view.reshape(-1, view.shape[-1]) for view in views]
+
+    for block, (_, C, K) in (
+        ("vertical", model.window.vertical(V350, V_RATE)),
+        ("lateral", model.window.lateral(V350, V_RATE)),
     ):
-        for block in range(2 * B):
-            rows = slice(start + block * count, start + (block + 1) * count)
-            expected = -(C @ v[rows] + K @ u[rows])
-            scale = abs(C) @ np.abs(v[rows]) + abs(K) @ np.abs(u[rows])
-            assert np.all(np.abs(motion[at.LINEAR, rows] - expected) < 1e-13 * scale)
+        for u, v, found in zip(*rows(block), strict=True):
+            scale = abs(C) @ np.abs(v) + abs(K) @ np.abs(u)
+            assert np.all(np.abs(found + C @ v + K @ u) < 1e-13 * scale)
+    slab, train = g.designs.matrices[0], g.train
+    own = [
+        ("slabs", model.slab_inverse[0].T, slab.K_plate + slab.K_bed, slab.C_bed),
+        ("vehicles", model.blocks.vehicle.T, train.K, train.C + V350 * train.C_speed),
+    ]
+    for block, inverse, K, C in own:
+        for u, v, found in zip(*rows(block), strict=True):
+            force = -(K @ u + C @ v)
+            scale = np.abs(inverse) @ (np.abs(K) @ np.abs(u) + np.abs(C) @ np.abs(v))
+            assert np.all(np.abs(found - inverse @ force) <= 1e-12 * scale)
 
 
 BED = {"k": 4e7 / 0.63, "c": 5e4 / 0.63}  # fastenings smeared (FACTS 3.6)

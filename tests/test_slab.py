@@ -68,15 +68,12 @@ def test_designs_keep_their_own_bed(slab_and_mortar: tuple[Slab, Mortar]) -> Non
     np.testing.assert_array_equal(designs[0].K_plate, designs[2].K_plate)
 
 
-def test_matrices_are_symmetric_banded_and_not_negative(matrices: SlabMatrices) -> None:
-    """Symmetric to the last bit; the plate's part lies within the stated band; no negative eigenvalue."""
+def test_matrices_are_symmetric_and_not_negative(matrices: SlabMatrices) -> None:
+    """Symmetric to the last bit; no negative eigenvalue."""
     for K in (matrices.M, matrices.K_plate, matrices.K_bed, matrices.C_bed):
         np.testing.assert_array_equal(K, K.T)
-        i, j = np.nonzero(K[:-2, :-2])
-        assert np.abs(i - j).max() <= matrices.half_band
         eigenvalues = np.linalg.eigvalsh(K)
         assert eigenvalues[0] > -100 * ROUNDING * eigenvalues[-1]  # rounding of 92 x 92 numbers
-    assert np.abs(np.subtract(*np.nonzero(matrices.K_plate))).max() == matrices.half_band
 
 
 # Plate

@@ -24,21 +24,23 @@ class Blocks:
         vertical: Inverse of the rail's vertical block, shape (2N, 2N), transposed for right multiplication.
         lateral: Inverse of the rail's lateral block, shape (3N, 3N), transposed.
         vehicle: Inverse of the train's block, shape (n, n), transposed.
-        vertical_response: a of the rail by unit vertical forces at the wheels, shape (2N, W).
-        lateral_response: a by unit lateral forces and roll moments, wheel by wheel, shape (3N, 2W).
-        vehicle_response: a of the train by unit forces on y, z, roll, pitch, yaw of the wheelsets, shape (n, 5W).
+        vehicle_linear: The train's u, and its v, to its acceleration by its own stiffness and damping, shape (2, n, n).
+        rail_answer: Rows of A^-1 of the rail's value and slope under the wheels: of w (2N), v (3N), theta_x (3N), shape
+            (W, 2, 8N).
+        vehicle_answer: Rows of A^-1 of y, z, roll, pitch, yaw of the wheelsets, shape (5W, n).
         wheelset_compliance: The same at the wheelsets themselves, shape (W, 5, 5).
-        rail_compliance: a and its slope a' under a wheel by forces there, in w, v, theta_x, shape (W, 2, 3, 3).
+        rail_coupling: a and its slope a' under a wheel by forces under another of the same rail, in w, v, theta_x,
+            shape (W, 2, W, 3, 3).
     """
 
     vertical: NDArray[np.float64]
     lateral: NDArray[np.float64]
     vehicle: NDArray[np.float64]
-    vertical_response: NDArray[np.float64]
-    lateral_response: NDArray[np.float64]
-    vehicle_response: NDArray[np.float64]
+    vehicle_linear: NDArray[np.float64]
+    rail_answer: NDArray[np.float64]
+    vehicle_answer: NDArray[np.float64]
     wheelset_compliance: NDArray[np.float64]
-    rail_compliance: NDArray[np.float64]
+    rail_coupling: NDArray[np.float64]
 
     @classmethod
     def empty(cls, modes: int, wheelsets: int, vehicle: int) -> Blocks:
@@ -48,11 +50,11 @@ class Blocks:
             vertical=np.zeros((2 * n, 2 * n)),
             lateral=np.zeros((3 * n, 3 * n)),
             vehicle=np.zeros((vehicle, vehicle)),
-            vertical_response=np.zeros((2 * n, w)),
-            lateral_response=np.zeros((3 * n, 2 * w)),
-            vehicle_response=np.zeros((vehicle, 5 * w)),
+            vehicle_linear=np.zeros((2, vehicle, vehicle)),
+            rail_answer=np.zeros((w, 2, 8 * n)),
+            vehicle_answer=np.zeros((5 * w, vehicle)),
             wheelset_compliance=np.zeros((w, 5, 5)),
-            rail_compliance=np.zeros((w, 2, 3, 3)),
+            rail_coupling=np.zeros((w, 2, w, 3, 3)),
         )
 
     def fill(
@@ -77,18 +79,20 @@ class Blocks:
             wheel_shape: sin(k_i s) and its slope under the wheels, shape (2, W, N).
         """
         vertical, lateral = rail_inverses(window, fastening, spacing, newmark, V)
-        A = newmark.operator(sp.csr_array(train.M), sp.csr_array(train.C + V * train.C_speed), sp.csr_array(train.K))
-        vehicle = inverse(A, "vehicle")
+        C = train.C + V * train.C_speed
+        vehicle = inverse(newmark.operator(sp.csr_array(train.M), sp.csr_array(C), sp.csr_array(train.K)), "vehicle")
         self.vertical[:], self.lateral[:], self.vehicle[:] = vertical.T, lateral.T, vehicle.T
-        n, value, slope = window.modes, wheel_shape[0], wheel_shape[1]
-        self.vertical_response[:] = vertical[:, :n] @ value.T
-        self.lateral_response[:, 0::2] = lateral[:, :n] @ value.T
-        self.lateral_response[:, 1::2] = lateral[:, 2 * n :] @ value.T
-        self.vehicle_response[:] = vehicle[:, train.wheelset_dof.ravel()]
+        self.vehicle_linear[:] = -np.stack([train.K.T, C.T]) @ vehicle.T
+        self.vehicle_answer[:] = vehicle[train.wheelset_dof.ravel()]
         for w, dof in enumerate(train.wheelset_dof):
             self.wheelset_compliance[w] = vehicle[np.ix_(dof, dof)]
-            across = self.lateral_response[:, 2 * w : 2 * w + 2]
-            for kind, shape in enumerate((value[w], slope[w])):
-                self.rail_compliance[w, kind, 0, 0] = shape @ self.vertical_response[:n, w]
-                self.rail_compliance[w, kind, 1, 1:] = shape @ across[:n]
-                self.rail_compliance[w, kind, 2, 1:] = shape @ across[2 * n :]
+        n = window.modes
+        sines = (vertical[:n], lateral[:n], lateral[2 * n :])  # rows of A^-1 of w, v, theta_x
+        for kind, shape in enumerate(wheel_shape):
+            self.rail_answer[:, kind] = np.hstack([shape @ rows for rows in sines])
+        vertical_rows, v, x = np.split(self.rail_answer, [2 * n, 5 * n], axis=2)
+        force = wheel_shape[0].T
+        self.rail_coupling[..., 0, 0] = vertical_rows[..., :n] @ force
+        for field, lateral_rows in ((1, v), (2, x)):
+            self.rail_coupling[..., field, 1] = lateral_rows[..., :n] @ force
+            self.rail_coupling[..., field, 2] = lateral_rows[..., 2 * n :] @ force

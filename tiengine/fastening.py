@@ -1,4 +1,4 @@
-"""Rail fastenings: parameters, and the tables the kernel gathers and scatters with (MODEL §3)."""
+"""Rail fastenings: parameters, and the constant tables of the seats' shapes (MODEL §3)."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def seat_tables(modes: int, length: float, spacing: float) -> NDArray[np.float64
         spacing: Seat pitch d [m].
 
     Returns:
-        cos(k_i j d) for i = 1..N, then sin(k_i j d), with k_i = i pi / l; shape (seats, 2 N).
+        cos(k_i j d) for i = 1..N, then sin(k_i j d), with k_i = i pi / l; shape (2 N, seats).
     """
-    j = np.arange(seat_count(length, spacing))[:, None]
     k = np.arange(1, modes + 1) * np.pi / length
-    return np.ascontiguousarray(np.hstack([np.cos(k * j * spacing), np.sin(k * j * spacing)]))
+    phase = np.outer(k, np.arange(seat_count(length, spacing)) * spacing)
+    return np.vstack([np.cos(phase), np.sin(phase)])

@@ -36,8 +36,9 @@ from scipy.sparse.linalg import splu
 from tiengine.fastening import Fastening
 from tiengine.quantity import InputError
 from tiengine.rail import RailWindow
+from tiengine.slab import SlabMatrices
 
-__all__ = ["Newmark", "inverse", "rail_inverses", "seat_inverse_terms", "slab_operator", "smearing"]
+__all__ = ["Newmark", "inverse", "rail_inverses", "seat_inverse_terms", "seat_shapes", "smearing"]
 
 INVERSE_TOLERANCE = 1e-7  # ||A A^-1 - I||: an ill-conditioned block (cond 1e9) is refused
 
@@ -65,6 +66,17 @@ class Newmark:
     def gamma_dt(self) -> float:
         """Gamma dt [s]: end-of-step velocity per unit acceleration."""
         return self.gamma * self.dt
+
+    @property
+    def predictor(self) -> NDArray[np.float64]:
+        """Rows u~, v~ from u, v, a; shape (2, 3)."""
+        dt = self.dt
+        return np.array([[1.0, dt, (0.5 - self.beta) * dt**2], [0.0, 1.0, (1.0 - self.gamma) * dt]])
+
+    @property
+    def corrector(self) -> NDArray[np.float64]:
+        """Rows u, v at the end of the step from a, u~, v~; shape (2, 3)."""
+        return np.array([[self.beta_dt2, 1.0, 0.0], [self.gamma_dt, 0.0, 1.0]])
 
     def operator(self, M: sp.sparray, C: sp.sparray, K: sp.sparray) -> sp.csc_array:
         """M + gamma dt C + beta dt^2 K."""
@@ -131,22 +143,32 @@ def rail_inverses(
     )
 
 
+def seat_shapes(slab: SlabMatrices) -> NDArray[np.float64]:
+    """Slab coordinates to the motion at its seats: w left and right, dw/dy left and right, y.
+
+    Args:
+        slab: Its matrices; the last two coordinates are lateral displacement and yaw.
+
+    Returns:
+        Shape (dofs, 5 seats), seat by seat within each of the five.
+    """
+    seats = len(slab.seat_x)
+    shapes = np.zeros((slab.n, 5, seats))
+    for seat in range(seats):
+        for side in range(2):
+            shapes[slab.seat_index[seat, side], side, seat] = slab.seat_w[seat, side]
+            shapes[slab.seat_index[seat, side], 2 + side, seat] = slab.seat_slope[seat, side]
+        shapes[-2:, 4, seat] = 1.0, slab.seat_x[seat]
+    return shapes.reshape(slab.n, 5 * seats)
+
+
 def seat_inverse_terms(
-    n: int,
-    index: NDArray[np.int32],
-    shape: NDArray[np.float64],
-    x: NDArray[np.float64],
-    scale: NDArray[np.float64],
-    fastening: Fastening,
-    half_base: float,
-) -> tuple[sp.csr_array, sp.csr_array]:
+    shapes: NDArray[np.float64], scale: NDArray[np.float64], fastening: Fastening, half_base: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Stiffness and damping of a slab's own motion against its fastenings.
 
     Args:
-        n: DOFs of the slab; the last two are lateral displacement and yaw.
-        index: Plate DOFs under each seat, shape (seats, 2, 12).
-        shape: w and dw/dy there, shape (2, seats, 2, 12).
-        x: Seats from the slab's centre [m], shape (seats,).
+        shapes: As from :func:`seat_shapes`, shape (n, 5 seats).
         scale: Factor of each fastening, shape (seats, 2).
         fastening: Their sound values.
         half_base: b [m].
@@ -154,40 +176,14 @@ def seat_inverse_terms(
     Returns:
         K and C, shape (n, n).
     """
-    K, C = np.zeros((n, n)), np.zeros((n, n))
-    for seat in range(len(x)):
-        lateral = np.zeros(n)
-        lateral[-2:] = 1.0, x[seat]
-        for side in range(2):
-            w, slope = np.zeros(n), np.zeros(n)
-            w[index[seat, side]] = shape[0, seat, side]
-            slope[index[seat, side]] = shape[1, seat, side]
-            vertical = np.outer(w, w) + half_base**2 * np.outer(slope, slope)
-            across = np.outer(lateral, lateral)
-            K += scale[seat, side] * (fastening.vertical_stiffness * vertical + fastening.lateral_stiffness * across)
-            C += scale[seat, side] * (fastening.vertical_damping * vertical + fastening.lateral_damping * across)
-    return sp.csr_array(K), sp.csr_array(C)
+    b2, (left, right) = half_base**2, scale.T
 
+    def terms(vertical: float, lateral: float) -> NDArray[np.float64]:
+        weights = [vertical * left, vertical * right, b2 * vertical * left, b2 * vertical * right]
+        matrix: NDArray[np.float64] = (shapes * np.concatenate([*weights, lateral * (left + right)])) @ shapes.T
+        return matrix
 
-def slab_operator(K: NDArray[np.float64], C: NDArray[np.float64], half_band: int) -> NDArray[np.float64]:
-    """K and C by diagonals, the layout of the slab kernel.
-
-    Args:
-        K: Stiffness, shape (n, n).
-        C: Damping, shape (n, n).
-        half_band: Diagonals beside the main one.
-
-    Returns:
-        Entry [0 or 1, i, j - i + half_band], shape (2, n, 2 half_band + 1).
-
-    Raises:
-        ValueError: An entry lies outside the band.
-    """
-    n = len(K)
-    band = np.zeros((2, n, 2 * half_band + 1))
-    for kind, matrix in enumerate((K, C)):
-        rows, columns = np.nonzero(matrix)
-        if np.any(np.abs(rows - columns) > half_band):
-            raise ValueError("slab matrix has entries outside its band")
-        band[kind, rows, columns - rows + half_band] = matrix[rows, columns]
-    return band
+    return (
+        terms(fastening.vertical_stiffness, fastening.lateral_stiffness),
+        terms(fastening.vertical_damping, fastening.lateral_damping),
+    )

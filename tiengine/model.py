@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tiengine.blocks import Blocks
 from tiengine.contact_geometry import ContactTable
 from tiengine.fastening import Fastening, seat_count, seat_tables
-from tiengine.integrator import Newmark, inverse, seat_inverse_terms, slab_operator, smearing
+from tiengine.integrator import Newmark, inverse, seat_inverse_terms, seat_shapes, smearing
 from tiengine.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
 from tiengine.mortar import Mortar
@@ -108,10 +108,13 @@ class Model:
         centre_s: Centre of the first vehicle in the window [m].
         dims: Sizes and offsets (``layout``).
         constants: Numbers (``layout``).
-        stiffness, mass, G: Rail coefficients, shapes (N, 8), (5,), (2, N, N).
-        gather_table, scatter_table: Seat tables, shapes (seats, 2N), (2N, seats).
-        seat_index, seat_shape, seat_x: Slab under the seats, shapes (n, 2, 12), (2, n, 2, 12), (n,).
-        band: Slab operators, shape (designs, 2, dofs, 2 half_band + 1).
+        stiffness: Elastic coefficients of the rails by mode, shape (N, 8).
+        flow_sine, flow_cosine: G of the sine and cosine fields, transposed, shape (N, N).
+        seat_table: cos and sin of k_i j d, shape (2N, seats).
+        slab_seats: Slab coordinates to the seats: w left and right, dw/dy left and right, y; shape (dofs, 5 seats).
+        slab_linear: A slab's u, and its v, to its acceleration by its own stiffness and damping, shape
+            (2, designs, dofs, dofs).
+        slab_push: Forces of the seats (as ``slab_seats``) to the slab's acceleration, shape (designs, 5 seats, dofs).
         slab_inverse: Inverses of the slab blocks, transposed, shape (designs, dofs, dofs).
         bed_index, bed_shape, bed_weight: Quadrature of the bed.
         bed_factor, bed_rest: Factors and pressures at rest by design.
@@ -130,14 +133,12 @@ class Model:
     dims: NDArray[np.int32]
     constants: NDArray[np.float64]
     stiffness: NDArray[np.float64]
-    mass: NDArray[np.float64]
-    G: NDArray[np.float64]
-    gather_table: NDArray[np.float64]
-    scatter_table: NDArray[np.float64]
-    seat_index: NDArray[np.int32]
-    seat_shape: NDArray[np.float64]
-    seat_x: NDArray[np.float64]
-    band: NDArray[np.float64]
+    flow_sine: NDArray[np.float64]
+    flow_cosine: NDArray[np.float64]
+    seat_table: NDArray[np.float64]
+    slab_seats: NDArray[np.float64]
+    slab_linear: NDArray[np.float64]
+    slab_push: NDArray[np.float64]
     slab_inverse: NDArray[np.float64]
     bed_index: NDArray[np.int32]
     bed_shape: NDArray[np.float64]
@@ -180,7 +181,7 @@ def build_model(given: Ingredients, V: float) -> Model:
     centre_s = given.length / 2.0 - middle
     wheel_s = centre_s + train.wheelset_x
     first = given.designs.matrices[0]
-    table = seat_tables(given.modes, given.length, given.slab.fastening_pitch)
+    sine, cosine = sine_products(given.modes)
     model = Model(
         given=given,
         window=window,
@@ -189,13 +190,9 @@ def build_model(given: Ingredients, V: float) -> Model:
         dims=_dims(given, first),
         constants=_constants(given, window),
         stiffness=window.modal_stiffness,
-        mass=window.modal_masses,
-        G=sine_products(given.modes),
-        gather_table=table,
-        scatter_table=np.ascontiguousarray(table.T),
-        seat_index=first.seat_index,
-        seat_shape=np.stack([first.seat_w, first.seat_slope]),
-        seat_x=first.seat_x,
+        flow_sine=np.ascontiguousarray(sine.T),
+        flow_cosine=np.ascontiguousarray(cosine.T),
+        seat_table=seat_tables(given.modes, given.length, given.slab.fastening_pitch),
         **_slab_arrays(given),
         vehicle_load=np.stack([train.gravity, train.acceleration_force]),
         wheel=np.stack([train.wheel_radius, train.half_spacing, train.wheelset_spin_inertia], axis=1),
@@ -218,7 +215,6 @@ def _dims(given: Ingredients, first: SlabMatrices) -> NDArray[np.int32]:
     dims[at.LATERAL] = B * 4 * n
     dims[at.SLABS] = B * 10 * n
     dims[at.VEHICLES] = B * (10 * n + given.slots * first.n)
-    dims[at.HALF_BAND] = first.half_band
     dims[at.BODIES] = len(given.train.body_names)
     dims[at.MORTAR_MODE] = 2 if explicit else 1 if no_tension else 0
     dims[at.CROSS_LEVEL_ROLLS] = int(given.cross_level_rolls)
@@ -231,7 +227,7 @@ def _constants(given: Ingredients, window: RailWindow) -> NDArray[np.float64]:
     newmark, fastening, rail, table = given.newmark, given.fastening, given.rail, given.contact
     dt = newmark.dt
     c[at.DT], c[at.BETA_DT2], c[at.GAMMA_DT] = dt, newmark.beta_dt2, newmark.gamma_dt
-    c[at.HALF_BETA_DT2], c[at.HALF_GAMMA_DT] = (0.5 - newmark.beta) * dt**2, (1.0 - newmark.gamma) * dt
+    c[at.MASS], c[at.INERTIA_Y], _, c[at.INERTIA_Z], c[at.INERTIA_X] = rail.densities
     c[at.LENGTH], c[at.SPACING] = given.length, given.slab.fastening_pitch
     c[at.K_VERTICAL], c[at.C_VERTICAL] = fastening.vertical_stiffness, fastening.vertical_damping
     c[at.K_LATERAL], c[at.C_LATERAL] = fastening.lateral_stiffness, fastening.lateral_damping
@@ -249,27 +245,23 @@ def _constants(given: Ingredients, window: RailWindow) -> NDArray[np.float64]:
 
 
 def _slab_arrays(given: Ingredients) -> dict[str, Any]:
-    """Operators, inverses and bed tables of every slab design."""
+    """Products, inverses and bed tables of every slab design."""
     designs, mortar = given.designs.matrices, given.mortar
-    band, inverses = [], []
+    first = designs[0]
+    seats = seat_shapes(first)
+    linear, push, inverses = [], [], []
     for slab, scale in zip(designs, given.designs.seat_scale, strict=True):
         K = slab.K_plate if given.explicit_mortar else slab.K_plate + slab.K_bed
         C = np.zeros_like(K) if given.explicit_mortar else slab.C_bed
-        own_K, own_C = seat_inverse_terms(
-            slab.n,
-            slab.seat_index,
-            np.stack([slab.seat_w, slab.seat_slope]),
-            slab.seat_x,
-            scale,
-            given.fastening,
-            given.rail.half_base,
-        )
-        A = given.newmark.operator(sp.csr_array(slab.M), sp.csr_array(C) + own_C, sp.csr_array(K) + own_K)
+        own_K, own_C = seat_inverse_terms(seats, scale, given.fastening, given.rail.half_base)
+        A = given.newmark.operator(sp.csr_array(slab.M), sp.csr_array(C + own_C), sp.csr_array(K + own_K))
         inverses.append(inverse(A, "slab").T)
-        band.append(slab_operator(K, C, slab.half_band))
-    first = designs[0]
+        linear.append(-np.stack([K.T, C.T]) @ inverses[-1])
+        push.append(seats.T @ inverses[-1])
     return {
-        "band": np.stack(band),
+        "slab_seats": seats,
+        "slab_linear": np.stack(linear, axis=1),
+        "slab_push": np.stack(push),
         "slab_inverse": np.stack(inverses),
         "bed_index": first.bed_index,
         "bed_shape": first.bed_shape,

@@ -135,7 +135,6 @@ class SlabMatrices:
         K_plate: Stiffness of the plate, shape (n, n); zero for lateral displacement and yaw.
         K_bed: Stiffness of the bed, lateral bed included, shape (n, n).
         C_bed: Damping of the bed, lateral bed included, shape (n, n).
-        half_band: Diagonals beside the main one that the plate's part occupies.
         seat_index: DOFs of the element under every seat, shape (fastenings, 2, 12).
         seat_w: Shapes: w at a seat is seat_w . u[seat_index], shape (fastenings, 2, 12).
         seat_slope: dw/dy at a seat is seat_slope . u[seat_index] [1/m for the w DOFs], shape (fastenings, 2,
@@ -153,7 +152,6 @@ class SlabMatrices:
     K_plate: NDArray[np.float64]
     K_bed: NDArray[np.float64]
     C_bed: NDArray[np.float64]
-    half_band: int
     seat_index: NDArray[np.int32]
     seat_w: NDArray[np.float64]
     seat_slope: NDArray[np.float64]
@@ -257,7 +255,6 @@ def _build(slab: Slab, mortar: Mortar, groups: list[list[MortarVoid]]) -> list[S
                 K_plate=stiffness[d],
                 K_bed=K_bed,
                 C_bed=damp[:, None] * area,
-                half_band=3 * (slab.elements_y + 2) + 2,
                 seat_index=seat_index,
                 seat_w=seat_w,
                 seat_slope=seat_slope,

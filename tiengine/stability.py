@@ -64,7 +64,7 @@ def is_stable(model: Model, V: float) -> bool:
 
 def _energy(model: Model, state: State) -> float:
     """Kinetic and elastic energy of rails and slabs [J], the rails' by their decoupled fields."""
-    s, mass, n = model.stiffness, model.mass, model.given.modes
+    s, mass, n = model.stiffness, model.window.modal_masses, model.given.modes
     vertical, lateral = (_split(state, name, n) for name in ("vertical", "lateral"))
     total = 0.0
     for (u, v), masses, k in (

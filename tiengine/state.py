@@ -27,10 +27,9 @@ class State:
         motion: Rows of generalised coordinates, see ``layout``.
         seat_scale: Factors of the fastenings in the window, shape (B, seats, 2).
         design: Design of the slab in each slot, shape (B, slots).
-        modal, seat_motion, seat_force: Fastening scratch and forces.
+        seat_force: F_V, F_L and roll moment M_b - a F_L of the seats on the rails, shape (B, 2, 3, seats).
         pressure: Largest and smallest mortar pressure of each slab [Pa], shape (B, slots, 2).
-        rail_free, contact, force, wheelset_force, rail_force, wheelset_before, rail_before: Contact; ``force`` starts
-            the next solve.
+        contact, force, wheelset_force, rail_force: Contact; ``force`` starts the next solve.
         iterations: Most Newton iterations of each wheelset since last reset, shape (B, W).
         first_seat, first_slab: Rear seat and slab of the window.
     """
@@ -38,17 +37,12 @@ class State:
     motion: NDArray[np.float64]
     seat_scale: NDArray[np.float64]
     design: NDArray[np.int32]
-    modal: NDArray[np.float64]
-    seat_motion: NDArray[np.float64]
     seat_force: NDArray[np.float64]
     pressure: NDArray[np.float64]
-    rail_free: NDArray[np.float64]
     contact: NDArray[np.float64]
     force: NDArray[np.float64]
     wheelset_force: NDArray[np.float64]
     rail_force: NDArray[np.float64]
-    wheelset_before: NDArray[np.float64]
-    rail_before: NDArray[np.float64]
     iterations: NDArray[np.int32]
     first_seat: int = -1
     first_slab: int = -1
@@ -71,17 +65,12 @@ class State:
             motion=np.zeros((at.MOTION_ROWS, columns)),
             seat_scale=np.ones((B, seats, 2)),
             design=np.zeros((B, slots), dtype=np.int32),
-            modal=np.zeros((B, 12, 2 * n)),
-            seat_motion=np.zeros((B, 12, seats)),
-            seat_force=np.zeros((B, 6, seats)),
+            seat_force=np.zeros((B, 2, 3, seats)),
             pressure=np.zeros((B, slots, 2)),
-            rail_free=np.zeros((B, W, 2, 9)),
             contact=_first_contact(B, W),
             force=np.zeros((B, W, 2, 4)),
             wheelset_force=np.zeros((B, W, 5)),
             rail_force=np.zeros((B, W, 2, 3)),
-            wheelset_before=np.zeros((B, W, 5)),
-            rail_before=np.zeros((B, W, 2, 3)),
             iterations=np.zeros((B, W), dtype=np.int32),
             _blocks=blocks,
         )

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +15,7 @@ from tiengine.kernels import layout as at
 from tiengine.kernels import step as kernels
 from tiengine.launch import Launch
 from tiengine.model import Model
+from tiengine.scratch import Scratch
 from tiengine.state import State, positions
 
 __all__ = ["Chunk", "Stepper"]
@@ -53,7 +57,12 @@ class Chunk:
 
 
 class Stepper:
-    """Advances a state; binds the kernels to its arrays."""
+    """Advances a state; binds the kernels to its arrays.
+
+    Attributes:
+        scratch: What the stages leave for one another.
+        stages: Name and call of what one step does, pass by pass, in this order.
+    """
 
     def __init__(self, model: Model, state: State, chunk: Chunk, *, parallel: bool = False, public: bool = False):
         """Bind.
@@ -66,42 +75,132 @@ class Stepper:
             public: Public Taichi calls only.
         """
         self.model, self.state, self.chunk = model, state, chunk
-        self._tick = np.zeros(at.N_TICK, dtype=np.int32)
-        m, s, b = model, state, model.blocks
-        train = m.given.train
-        self._forces = Launch(
-            kernels.explicit_forces,
-            (parallel,),
-            (
-                self._tick, m.dims, m.constants, chunk.clock,
-                m.stiffness, m.mass, m.G, m.gather_table, m.scatter_table, s.seat_scale, m.seat_index, m.seat_shape,
-                m.seat_x, s.design, m.band, m.bed_index, m.bed_shape, m.bed_weight, m.bed_factor, m.bed_rest,
-                m.bed_lateral_K, m.bed_lateral_C, m.bed_numbers, train.K, train.C, train.C_speed, m.vehicle_load,
-                train.wheelset_dof, m.wheel, train.element_index, train.element_row, train.element_kind,
-                train.element_linear, train.element_table, s.motion, s.modal, s.seat_motion, s.seat_force,
-                s.pressure,
-            ),
-            public=public,
-        )  # fmt: skip
-        self._contact = Launch(
-            kernels.contact_and_update,
-            (parallel,),
-            (
-                self._tick, m.dims, m.constants, chunk.clock, m.given.contact.values, chunk.irregularity, m.wheel,
-                train.wheelset_dof, m.wheel_shape, b.wheelset_compliance, b.rail_compliance, b.vertical_response,
-                b.lateral_response, b.vehicle_response, s.motion, s.rail_free, s.contact, s.force, s.wheelset_force,
-                s.rail_force, s.wheelset_before, s.rail_before, s.iterations, s.pressure, chunk.wheel, chunk.body,
-                chunk.mortar,
-            ),
-            public=public,
-        )  # fmt: skip
+        self.scratch = Scratch.of(model)
+        self._tick = np.zeros((model.given.passes, at.N_TICK), dtype=np.int32)
+        self._tick[:, at.PASS] = np.arange(model.given.passes)
+        self._tick[-1, at.LAST_PASS] = 1
+        self._launches: list[Launch] = []
+        self._parallel, self._public = parallel, public
         self._speed = float("nan")
-        self._views = {name: (self._flat(at.F, name), self._flat(at.X, name)) for name in _BLOCKS}
-        self._window: tuple[int, int] | None = None
-        self._odd: list[tuple[int, int, int]] = []
+        self._window = (-1, -1)
+        self._odd: list[tuple[int, int]] = []
+        self._moves = np.zeros(0, dtype=np.bool_)
+        self._body_row = -1
+        self._vehicles = [state.view(row, "vehicles") for row in (at.U, at.V, at.A)]
+        self._mortar = self._bind_mortar(_ITERATE)
+        self.stages = tuple(self._stages())
+
+    def _launch(self, kernel: Any, *arrays: NDArray[Any]) -> Launch:
+        launch = Launch(kernel, (self._parallel,), arrays, public=self._public)
+        self._launches.append(launch)
+        return launch
+
+    def _stages(self) -> Iterator[tuple[str, Callable[[], object]]]:
+        """The step: see :mod:`tiengine.kernels.step`."""
+        m, k, blocks, motion = self.model, self.scratch, self.model.blocks, self.state.motion
+        newmark = m.given.newmark
+        F, a = ({block: self._flat(row, block) for block in _BLOCKS} for row in (at.F, at.A))
+        own = slice(int(m.dims[at.SLABS]), None)  # columns of slabs and trains
+        rails, slabs, forces = _rows(k.rail_factor), _rows(k.slab_factor), k.slab_force.reshape(len(a["slabs"]), -1)
+
+        yield "predict", _product(newmark.predictor, motion[at.U : at.A + 1], motion[at.U_PREDICTED : at.LINEAR])
+        yield "prepare", self._bind_prepare()
+        yield "rails", _product(_rows(k.flow[:3]), m.flow_sine, _rows(k.drift[:3]))
+        yield "rails", _product(_rows(k.flow[3:]), m.flow_cosine, _rows(k.drift[3:]))
+        for row, target, slab, train in zip(
+            (at.U_PREDICTED, at.V_PREDICTED), (motion[at.LINEAR, own], k.damped), m.slab_linear, blocks.vehicle_linear,
+            strict=True,
+        ):  # fmt: skip
+            of_slabs, of_trains = target[: a["slabs"].size], target[a["slabs"].size :]
+            yield "slabs", self._by_design(self._flat(row, "slabs"), slab, of_slabs.reshape(a["slabs"].shape))
+            yield "trains", _product(self._flat(row, "vehicles"), train, of_trains.reshape(a["vehicles"].shape))
+        yield "slabs", partial(np.add, motion[at.LINEAR, own], k.damped, motion[at.LINEAR, own])
+        for i, tick in enumerate(self._tick):
+            yield "seats", _product(rails, k.seat_shape, _rows(k.rail_pull))
+            yield "seats", _product(slabs, m.slab_seats, k.slab_pull[min(i, 1)].reshape(forces.shape))
+            if int(m.dims[at.MORTAR_MODE]) > 0:
+                yield "mortar", self._bind_mortar(_ITERATE if i else _PREDICTED)
+            yield "forces and contact", self._bind_forces(tick, _ITERATE if i else _PREDICTED)
+            yield "solve", _product(F["vertical"], blocks.vertical, a["vertical"])
+            yield "solve", _product(F["lateral"], blocks.lateral, a["lateral"])
+            yield "solve", _product(F["vehicles"], blocks.vehicle, a["vehicles"])
+            yield "solve", self._by_design(forces, m.slab_push, a["slabs"])
+            if int(m.dims[at.MORTAR_MODE]) > 0:
+                yield "solve", self._by_design(F["slabs"], m.slab_inverse, a["slabs"], add=True)
+            yield "solve", partial(np.add, motion[at.A, own], motion[at.LINEAR, own], motion[at.A, own])
+            yield "correct", _product(newmark.corrector, motion[at.A : at.LINEAR], motion[at.U : at.A])
+            if not tick[at.LAST_PASS]:
+                yield "factors", self._bind_factors(tick)
+        yield "recording", self._record_bodies
+
+    def _bind_prepare(self) -> Launch:
+        m, k = self.model, self.scratch
+        return self._launch(
+            kernels.prepare, self._tick[0], m.dims, m.constants, self.chunk.clock, m.seat_table, m.wheel_shape,
+            self.state.motion, k.seat_shape, k.flow, k.rail_factor, k.slab_factor, k.rail_predicted,
+        )  # fmt: skip
+
+    def _bind_factors(self, tick: NDArray[np.int32]) -> Launch:
+        m, k = self.model, self.scratch
+        return self._launch(
+            kernels.factors,
+            tick,
+            m.dims,
+            m.constants,
+            self.chunk.clock,
+            self.state.motion,
+            k.rail_factor,
+            k.slab_factor,
+        )
+
+    def _bind_forces(self, tick: NDArray[np.int32], rows: NDArray[np.int32]) -> Launch:
+        m, s, k, b, train = self.model, self.state, self.scratch, self.model.blocks, self.model.given.train
+        return self._launch(
+            kernels.forces_and_contact, tick, rows, m.dims, m.constants, self.chunk.clock, m.stiffness, k.drift,
+            s.seat_scale, k.seat_shape, k.rail_pull, k.slab_pull, m.vehicle_load, train.wheelset_dof, m.wheel,
+            train.element_index, train.element_row, train.element_kind, train.element_linear, train.element_table,
+            m.given.contact.values, self.chunk.irregularity, m.wheel_shape, b.wheelset_compliance, b.rail_coupling,
+            b.rail_answer, b.vehicle_answer, s.motion, s.seat_force, k.slab_force, k.rail_predicted, s.contact, s.force,
+            s.wheelset_force, s.rail_force, s.iterations, self.chunk.wheel,
+        )  # fmt: skip
+
+    def _bind_mortar(self, rows: NDArray[np.int32]) -> Launch:
+        m, s = self.model, self.state
+        return self._launch(
+            kernels.mortar_forces, rows, m.dims, s.design, m.bed_index, m.bed_shape, m.bed_weight, m.bed_factor,
+            m.bed_rest, m.bed_lateral_K, m.bed_lateral_C, m.bed_numbers, s.motion, s.pressure,
+        )  # fmt: skip
+
+    def _record_bodies(self) -> None:
+        """Copy the bodies' motion and the bed's pressures, if this step is asked for them."""
+        row = self._body_row
+        if row < 0:
+            return
+        if int(self.model.dims[at.MORTAR_MODE]) == 0:  # else known from the forces
+            self._mortar()
+        bodies = self.chunk.body.shape[-1]
+        for kind, view in enumerate(self._vehicles):
+            self.chunk.body[:, row, kind] = view[:, :bodies]
+        self.chunk.mortar[:, row] = self.state.pressure
+
+    def _by_design(
+        self, factor: NDArray[np.float64], matrices: NDArray[np.float64], out: NDArray[np.float64], add: bool = False
+    ) -> Callable[[], object]:
+        """Product of all slabs with the sound design's matrix, then of those that have another with their own."""
+        slots = self.state.design.shape[1]
+        sound, target = matrices[0], np.empty_like(out) if add else out
+
+        def product() -> None:
+            np.dot(factor, sound, out=target)
+            for slot, kind in self._odd:
+                target[slot::slots] = factor[slot::slots] @ matrices[kind]
+            if add:
+                np.add(out, target, out=out)
+
+        return product
 
     def compile(self) -> float:
-        """Compile both kernels by launching them for no train.
+        """Compile all kernels by launching them for no train.
 
         Returns:
             Wall time [s]; small when Taichi finds them in its cache on disk.
@@ -109,10 +208,10 @@ class Stepper:
         clock = time.perf_counter()
         dims = self.model.dims
         trains, dims[at.TRAINS] = int(dims[at.TRAINS]), 0
-        self._forces()
-        self._contact()
+        for launch in self._launches:
+            launch()
         dims[at.TRAINS] = trains
-        return time.perf_counter() - clock + self._forces.compile_seconds + self._contact.compile_seconds
+        return time.perf_counter() - clock + sum(launch.compile_seconds for launch in self._launches)
 
     def load(
         self,
@@ -129,8 +228,11 @@ class Stepper:
             V_rate: Its rate [m/s^2].
             irregularity: Track channels, shape (B, steps, W, N_IRREGULARITY).
         """
-        self.chunk.clock[: len(X)] = positions(self.model, X, V, V_rate).clock
+        clock = positions(self.model, X, V, V_rate).clock
+        self.chunk.clock[: len(X)] = clock
         self.chunk.irregularity[:, : len(X)] = irregularity
+        changes = np.diff(clock[:, [at.FIRST_SEAT, at.FIRST_SLAB, at.SPEED]], axis=0).any(axis=1)
+        self._moves = np.concatenate([[True], changes])
 
     def step(self, i: int, wheel_row: int = -1, body_row: int = -1) -> None:
         """Advance to the end of step ``i`` of the chunk.
@@ -140,41 +242,42 @@ class Stepper:
             wheel_row: Row of the wheels' record to fill, -1 none.
             body_row: Row of the bodies' record to fill, -1 none.
         """
-        clock, tick = self.chunk.clock, self._tick
-        self._move(int(clock[i, at.FIRST_SEAT]), int(clock[i, at.FIRST_SLAB]), float(clock[i, at.SPEED]))
-        tick[at.STEP], tick[at.WHEEL_RECORD], tick[at.BODY_RECORD] = i, wheel_row, body_row
-        last = self.model.given.passes - 1
-        for k in range(last + 1):
-            tick[at.PASS], tick[at.LAST_PASS] = k, k == last
-            self._forces()
-            self._solve()
-            self._contact()
+        if self._moves[i]:
+            self.move(i)
+        self._tick[:, _ASKED] = i, wheel_row
+        self._body_row = body_row
+        for _, stage in self.stages:
+            stage()
 
-    def _move(self, first_seat: int, first_slab: int, V: float) -> None:
-        """Let seats and slabs in and out; factorise anew when the speed has changed enough."""
-        if (first_seat, first_slab) != self._window:  # the first step too: the start has let the first slabs in
-            self._window = first_seat, first_slab
-            self.state.enter(self.model, first_seat, first_slab)
-            self._odd = [(int(b), int(s), int(self.state.design[b, s])) for b, s in np.argwhere(self.state.design)]
+    def move(self, i: int) -> None:
+        """Let seats and slabs in and out at step ``i``; factorise anew when the speed has changed enough."""
+        clock = self.chunk.clock[i]
+        window, V = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])), float(clock[at.SPEED])
+        if window != self._window:  # the first step too: the start has let the first slabs in
+            self._window = window
+            self.state.enter(self.model, *window)
+            self._odd = [(int(slot), int(self.state.design[0, slot])) for slot in np.flatnonzero(self.state.design[0])]
         if V != self._speed and not abs(V - self._speed) < REFACTOR * self._speed:
             self.model.refactor(V)
             self._speed = V
 
-    def _solve(self) -> None:
-        """X = A^-1 F, block by block."""
-        blocks, inverse, views = self.model.blocks, self.model.slab_inverse, self._views
-        for name, A in (("vertical", blocks.vertical), ("lateral", blocks.lateral), ("vehicles", blocks.vehicle)):
-            np.matmul(views[name][0], A, out=views[name][1])
-        F, X = views["slabs"]
-        np.matmul(F, inverse[0], out=X)
-        slots = self.state.design.shape[1]
-        for b, slot, kind in self._odd:
-            np.matmul(F[b * slots + slot], inverse[kind], out=X[b * slots + slot])
-
     def _flat(self, row: int, block: str) -> NDArray[np.float64]:
         """A block as right-hand sides, shape (B m, n)."""
-        view = self.state.view(row, block)
-        return view.reshape(-1, view.shape[-1])
+        return _rows(self.state.view(row, block))
+
+
+def _rows(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    return array.reshape(-1, array.shape[-1])
+
+
+def _product(
+    factor: NDArray[np.float64], matrix: NDArray[np.float64], out: NDArray[np.float64]
+) -> Callable[[], object]:
+    """The call that fills ``out`` with factor @ matrix."""
+    return partial(np.dot, factor, matrix, out)
 
 
 _BLOCKS = ("vertical", "lateral", "slabs", "vehicles")
+_PREDICTED = np.array([at.U_PREDICTED, at.V_PREDICTED], dtype=np.int32)
+_ITERATE = np.array([at.U, at.V], dtype=np.int32)
+_ASKED = [at.STEP, at.WHEEL_RECORD]

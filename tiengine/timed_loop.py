@@ -27,16 +27,16 @@ BLOCK_STEPS = 100
 
 
 STAGE_NAMES = {
-    "window": "window and seats",
-    "predict": "predictors",
+    "predict": "predictors and correctors",
+    "correct": "predictors and correctors",
+    "prepare": "window and seats",
+    "factors": "motion at the seats",
+    "seats": "motion at the seats",
     "rails": "linear forces",
     "slabs": "linear forces",
-    "vehicles": "linear forces",
-    "seats": "motion at the seats",
-    "forces": "fastening kernel",
-    "mortar": "mortar",
+    "trains": "linear forces",
+    "forces and contact": "fastening kernel",
     "solve": "implicit solve",
-    "contact": "contact",
 }
 """What reports call the stages of ``Stepper.stages``; several may share a name, those not named here keep theirs."""
 

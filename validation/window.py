@@ -104,8 +104,8 @@ def _seats_of_window() -> Reals:
         for i in range(steps):
             stepper.step(i)
             place = chosen - state.first_seat
-            inside = (place >= 0) & (place < state.seat_force.shape[2])
-            forces[i, inside] = state.seat_force[0, 0, place[inside]]
+            inside = (place >= 0) & (place < state.seat_force.shape[3])
+            forces[i, inside] = state.seat_force[0, 0, 0, place[inside]]
     return forces
 
 

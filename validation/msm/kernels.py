@@ -9,8 +9,9 @@ import taichi as ti
 
 from tiengine.kernels import contact as ct
 from tiengine.kernels import layout as at
-from tiengine.kernels import linear, suspension
 from tiengine.kernels import step as engine
+from tiengine.kernels import suspension
+from tiengine.kernels import under_wheels as uw
 from tiengine.kernels.types import (
     Array,
     Ints1,
@@ -29,9 +30,9 @@ W, THETA_Y, V, THETA_Z, THETA_X = range(FIELDS)
 
 
 @ti.func
-def predict_rails(constants: Array, stiffness: Array, rails: Array):
+def predict_rails(constants: Array, numbers: Array, stiffness: Array, rails: Array):
     """Newmark predictors, and -K u at them in row LINEAR."""
-    dt, half_beta, half_gamma = constants[at.DT], constants[at.HALF_BETA_DT2], constants[at.HALF_GAMMA_DT]
+    dt, half_beta, half_gamma = constants[at.DT], numbers[m.HALF_BETA_DT2], numbers[m.HALF_GAMMA_DT]
     for f in ti.static(range(2 * FIELDS)):
         for i in range(rails.shape[2]):
             u, v, a = rails[at.U, f, i], rails[at.V, f, i], rails[at.A, f, i]
@@ -88,7 +89,7 @@ def wheel_shapes(position: float, numbers: Array, wheelset_x: Array, shape: Arra
 
 @ti.func
 def compliances(inverse: Array, shape: Array, compliance: Array):
-    """A and a' under a wheelset by unit forces there, in w, v, theta_x: ``compliance[w, value or slope, 3, 3]``."""
+    """A and a' under a wheelset by unit forces there, in w, v, theta_x: ``compliance[w, value or slope, w, 3, 3]``."""
     for w in range(shape.shape[1]):
         for kind in ti.static(range(2)):
             total = ti.Vector.zero(ti.f64, 4)
@@ -96,11 +97,11 @@ def compliances(inverse: Array, shape: Array, compliance: Array):
                 both = shape[0, w, i] * shape[kind, w, i]
                 for n, row in ti.static(enumerate((m.INV_WW, m.INV_VV, m.INV_VX, m.INV_XX))):
                     total[n] += both * inverse[row, i]
-            compliance[w, kind, 0, 0] = total[0]
-            compliance[w, kind, 1, 1] = total[1]
-            compliance[w, kind, 1, 2] = total[2]
-            compliance[w, kind, 2, 1] = total[2]
-            compliance[w, kind, 2, 2] = total[3]
+            compliance[w, kind, w, 0, 0] = total[0]
+            compliance[w, kind, w, 1, 1] = total[1]
+            compliance[w, kind, w, 1, 2] = total[2]
+            compliance[w, kind, w, 2, 1] = total[2]
+            compliance[w, kind, w, 2, 2] = total[3]
 
 
 @ti.func
@@ -187,6 +188,63 @@ def rail_under_wheel(wheelset: int, rail: Template, speed: float, shape: Array, 
 
 
 @ti.func
+def predict_vehicle(constants: Array, numbers: Array, speed: float, K: Array, C: Array, C_speed: Array, motion: Array):
+    """Predictors of the vehicle, iterate at them, and -(C v + K u) there."""
+    n, dt = motion.shape[1], constants[at.DT]
+    for i in range(n):
+        u, v, a = motion[at.U, i], motion[at.V, i], motion[at.A, i]
+        motion[at.U_PREDICTED, i] = u + dt * v + numbers[m.HALF_BETA_DT2] * a
+        motion[at.V_PREDICTED, i] = v + numbers[m.HALF_GAMMA_DT] * a
+    for i in range(n):
+        motion[at.U, i] = motion[at.U_PREDICTED, i]
+        motion[at.V, i] = motion[at.V_PREDICTED, i]
+        total = 0.0
+        for j in range(n):
+            total += K[i, j] * motion[at.U_PREDICTED, j]
+            total += (C[i, j] + speed * C_speed[i, j]) * motion[at.V_PREDICTED, j]
+        motion[at.LINEAR, i] = -total
+
+
+@ti.func
+def update_vehicle(constants: Array, motion: Array):
+    """Newmark correctors."""
+    for i in range(motion.shape[1]):
+        motion[at.U, i] = motion[at.U_PREDICTED, i] + constants[at.BETA_DT2] * motion[at.A, i]
+        motion[at.V, i] = motion[at.V_PREDICTED, i] + constants[at.GAMMA_DT] * motion[at.A, i]
+
+
+@ti.func
+def wheelset_now(wheelset: int, row: Template, dof: Array, motion: Array):
+    """Wheelset y, z, roll, pitch, yaw from a row of the motion."""
+    x = ti.Vector.zero(ti.f64, 5)
+    for k in ti.static(range(5)):
+        x[k] = motion[row, dof[wheelset, k]]
+    return x
+
+
+@ti.func
+def keep_forces(force: Array, rail: Array, force_before: Array, rail_before: Array):
+    """Remember the contact forces of the pass before."""
+    for w in range(force.shape[1]):
+        for k in ti.static(range(5)):
+            force_before[0, w, k] = force[0, w, k]
+        for side in range(2):
+            for k in ti.static(range(3)):
+                rail_before[0, w, side, k] = rail[0, w, side, k]
+
+
+@ti.func
+def keep_increments(force: Array, rail: Array, force_before: Array, rail_before: Array):
+    """Replace the contact forces of the pass before by the change since."""
+    for w in range(force.shape[1]):
+        for k in ti.static(range(5)):
+            force_before[0, w, k] = force[0, w, k] - force_before[0, w, k]
+        for side in range(2):
+            for k in ti.static(range(3)):
+                rail_before[0, w, side, k] = rail[0, w, side, k] - rail_before[0, w, side, k]
+
+
+@ti.func
 def add_vehicle_response(response: Array, force: Array, motion: Array):
     """Add A^-1 times forces on the wheelsets to the vehicle's acceleration."""
     for i in range(motion.shape[1]):
@@ -228,16 +286,15 @@ def explicit_forces(
         step = tick[at.STEP]
         speed = clock[step, at.SPEED]
         if tick[at.PASS] == 0:
-            predict_rails(constants, stiffness, rails)
-            engine.predict(0, dims, constants, motion)
-            linear.vehicle_linear_forces(0, speed, dims, K, C, C_speed, motion)
+            predict_rails(constants, numbers, stiffness, rails)
+            predict_vehicle(constants, numbers, speed, K, C, C_speed, motion)
         fold(numbers, target, sign, rails, folded_out)
+        engine.vehicle_forces(0, clock[step, at.SPEED_RATE], at.V, dims, vehicle_load, wheelset_dof, wheel, motion)
         for i in range(motion.shape[1]):
-            motion[at.F, i] = motion[at.LINEAR, i]
+            motion[at.F, i] = motion[at.F, i] + motion[at.LINEAR, i]
         suspension.add_suspension_forces(
             0, element_index, element_row, element_kind, element_linear, element_table, motion, at.U, at.V, at.F
         )
-        engine.add_vehicle_forces(0, clock[step, at.SPEED_RATE], dims, vehicle_load, wheelset_dof, wheel, motion)
 
 
 @ti.kernel
@@ -260,7 +317,7 @@ def implicit_and_contact(
     wheelset_compliance: Reals3,
     rails: Reals3,
     shape_out: Reals3,
-    rail_compliance_out: Reals4,
+    rail_compliance_out: Reals5,
     motion: Reals2,
     rail_free_out: Reals4,
     contact_out: Reals4,
@@ -270,7 +327,6 @@ def implicit_and_contact(
     wheelset_before_out: Reals3,
     rail_before_out: Reals4,
     wheel_record_out: Reals5,
-    body_record_out: Reals4,
 ):
     """Rails mode by mode, then contact against the compliance of rail and wheelset at the wheels' places."""
     ti.loop_config(serialize=True)
@@ -280,11 +336,10 @@ def implicit_and_contact(
         if tick[at.PASS] == 0:
             wheel_shapes(clock[step, at.POSITION], numbers, wheelset_x, shape_out)
             compliances(inverse, shape_out, rail_compliance_out)
-        engine.keep_forces(0, dims, wheelset_force_out, rail_force_out, wheelset_before_out, rail_before_out)
+        keep_forces(wheelset_force_out, rail_force_out, wheelset_before_out, rail_before_out)
         solve_rails(numbers, constants, inverse, target, sign, folded, shape_out, rail_before_out, rails)
-        engine.accept(0, dims, motion)
         add_vehicle_response(vehicle_response, wheelset_before_out, motion)
-        engine.update(0, dims, constants, motion)
+        update_vehicle(constants, motion)
         for w in range(dims[at.WHEELSETS]):
             for side in ti.static(range(2)):
                 rail_under_wheel(w, side, speed, shape_out, rails, rail_free_out)
@@ -293,21 +348,15 @@ def implicit_and_contact(
             for k in ti.static(range(at.N_IRREGULARITY)):
                 felt[k] = irregularity[0, step, w, k]
             ct.solve_wheelset(
-                0, w, speed, felt, dims, constants, wheel, wheelset_dof, table, wheelset_compliance,
-                rail_compliance_out, motion, rail_free_out, contact_out, force_out, wheelset_force_out,
-                rail_force_out, wheelset_before_out, rail_before_out,
+                0, w, speed, wheelset_now(w, at.U, wheelset_dof, motion), wheelset_now(w, at.V, wheelset_dof, motion),
+                uw.stored_rail(0, w, 0, rail_free_out), uw.stored_rail(0, w, 1, rail_free_out), felt, dims, constants,
+                wheel, table, wheelset_compliance, rail_compliance_out, contact_out, force_out, wheelset_force_out,
+                rail_force_out, constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD],
             )  # fmt: skip
-        engine.keep_increments(0, dims, wheelset_force_out, rail_force_out, wheelset_before_out, rail_before_out)
+        keep_increments(wheelset_force_out, rail_force_out, wheelset_before_out, rail_before_out)
         add_wheels(constants, inverse, shape_out, rail_before_out, rails)
         add_vehicle_response(vehicle_response, wheelset_before_out, motion)
-        engine.update(0, dims, constants, motion)
-        if tick[at.LAST_PASS] == 1:
-            if tick[at.WHEEL_RECORD] >= 0:
-                for w in range(dims[at.WHEELSETS]):
-                    ct.record_wheels(
-                        0, w, tick[at.WHEEL_RECORD], contact_out, force_out, rail_force_out, wheel_record_out
-                    )
-            if tick[at.BODY_RECORD] >= 0:
-                for i in range(5 * dims[at.BODIES]):
-                    for row in ti.static(range(3)):
-                        body_record_out[0, tick[at.BODY_RECORD], row, i] = motion[row, i]
+        update_vehicle(constants, motion)
+        if tick[at.LAST_PASS] == 1 and tick[at.WHEEL_RECORD] >= 0:
+            for w in range(dims[at.WHEELSETS]):
+                ct.record_wheels(0, w, tick[at.WHEEL_RECORD], contact_out, force_out, rail_force_out, wheel_record_out)

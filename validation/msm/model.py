@@ -43,8 +43,10 @@ Reals = NDArray[np.float64]
 """Rows of the rails' modal stiffness; the first six also of K in the vertical and the lateral plane."""
 (INV_WW, INV_WT, INV_TT, INV_VV, INV_VZ, INV_VX, INV_ZZ, INV_ZX, INV_XX) = range(9)
 """Rows of the inverses of the rails' operators by mode: vertical (w, theta_y), lateral (v, theta_z, theta_x)."""
-(KV, CV, KL, CL, ARM, BASE2, SMEAR_V, SMEAR_L, X_REAR, RAIL_LENGTH, N_NUMBERS) = range(11)
-"""Entries of ``numbers``: fastening, a, b^2, smeared operator per mode, rear end and length of the rail."""
+(
+    KV, CV, KL, CL, ARM, BASE2, SMEAR_V, SMEAR_L, X_REAR, RAIL_LENGTH, HALF_BETA_DT2, HALF_GAMMA_DT, N_NUMBERS,
+) = range(13)  # fmt: skip
+"""Entries of ``numbers``: fastening, a, b^2, smeared operator per mode, rear end and length of the rail, predictors."""
 
 REAR_MARGIN = 10.0
 """Least rail behind the last wheel at the start [m]; the rail begins at the joint of slabs before it."""
@@ -300,6 +302,7 @@ def _numbers(given: Ingredients, per_mode: float, rear: float, L: float) -> Real
         f.lateral_damping,
     )
     out[ARM], out[BASE2], out[X_REAR], out[RAIL_LENGTH] = r.arm_fastening, r.half_base**2, rear, L
+    out[HALF_BETA_DT2], out[HALF_GAMMA_DT] = newmark.predictor[:, 2]
     out[SMEAR_V] = per_mode * (newmark.beta_dt2 * f.vertical_stiffness + newmark.gamma_dt * f.vertical_damping)
     out[SMEAR_L] = per_mode * (newmark.beta_dt2 * f.lateral_stiffness + newmark.gamma_dt * f.lateral_damping)
     return out
@@ -327,8 +330,6 @@ def _constants(given: Ingredients, missing: Reals) -> Reals:
     c = np.zeros(at.N_CONSTANTS)
     newmark, table = given.newmark, given.contact
     c[at.DT], c[at.BETA_DT2], c[at.GAMMA_DT] = newmark.dt, newmark.beta_dt2, newmark.gamma_dt
-    c[at.HALF_BETA_DT2] = (0.5 - newmark.beta) * newmark.dt**2
-    c[at.HALF_GAMMA_DT] = (1.0 - newmark.gamma) * newmark.dt
     c[at.ARM_HEAD], c[at.FRICTION], c[at.CROWN_OFFSET] = given.rail.arm_head, given.friction, table.crown_offset
     c[at.IRREGULARITY_HALF_BASE], c[at.CONTACT_TOLERANCE] = HALF_BASE, CONTACT_TOLERANCE
     c[at.STATIC_LOAD] = float(np.max(static_wheel_loads(given.train)))

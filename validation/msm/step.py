@@ -144,26 +144,27 @@ class FullStepper:
             (
                 self._tick, track.dims, track.constants, buffers.clock, track.numbers, track.inverse, target, sign,
                 self._scattered, track.contact.values, buffers.irregularity, track.wheel, train.wheelset_x, dof,
-                response, compliance, state.rails, np.zeros((2, W, modes)), np.zeros((W, 2, 3, 3)), state.motion,
+                response, compliance, state.rails, np.zeros((2, W, modes)), np.zeros((W, 2, W, 3, 3)), state.motion,
                 np.zeros((1, W, 2, 9)), state.contact, state.force, state.wheelset_force, state.rail_force,
-                np.zeros((1, W, 5)), np.zeros((1, W, 2, 3)), buffers.wheel, buffers.body,
+                np.zeros((1, W, 5)), np.zeros((1, W, 2, 3)), buffers.wheel,
             ),
         )  # fmt: skip
 
     def step(self, i: int, wheel_row: int = -1, body_row: int = -1) -> None:
         """Advance to the end of step ``i`` of the chunk; rows of the records to fill, -1 none."""
         tick, last = self._tick, self.track.passes - 1
-        tick[at.STEP], tick[at.WHEEL_RECORD], tick[at.BODY_RECORD] = i, wheel_row, body_row
+        tick[at.STEP], tick[at.WHEEL_RECORD] = i, wheel_row
         self._predict_slabs()
         for k in range(last + 1):
             tick[at.PASS], tick[at.LAST_PASS] = k, k == last
             self._forces()
             self._seats(first=k == 0)
             self._solve_slabs()
-            np.matmul(self._vehicle, self.state.motion[at.F], out=self.state.motion[at.X])
+            np.matmul(self._vehicle, self.state.motion[at.F], out=self.state.motion[at.A])
             self._contact()
         if body_row >= 0:
             self.buffers.slabs[body_row] = self.state.slabs[:2]
+            self.buffers.body[0, body_row] = self.state.motion[: at.A + 1, : self.buffers.body.shape[-1]]
 
     def _predict_slabs(self) -> None:
         """Predictors of the slabs and -(C v + K u) at them."""
