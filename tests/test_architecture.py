@@ -15,7 +15,7 @@ LAYERS = [
     {"rail", "fastening", "slab", "mortar", "profile", "hertz", "kalker", "speed", "spectrum", "connector", "coach",
      "vehicle", "assembly", "train", "contact_search", "contact_geometry", "conicity", "realisation", "given_track",
      "irregularity", "defects"},
-    {"parts", "ensemble", "scenario"},
+    {"parts", "ensemble", "scenario", "contact_cache"},
     {"integrator", "blocks", "model", "plan"},
     {"state", "scratch", "track_static"},
     {"stepper", "start", "setup"},

@@ -67,7 +67,7 @@ def _largest_seat_forces(*overrides: str) -> np.ndarray:
     largest = np.zeros((50, 2))
 
     def each(_: int, stepper) -> None:
-        force = stepper.state.seat_force[0, [0, 3]].T
+        force = stepper.state.seat_force[0, :, 0].T
         here = np.arange(40, 90) - stepper.state.first_seat
         inside = (here >= 0) & (here < len(force))
         largest[inside] = np.maximum(largest[inside], np.abs(force[here[inside]]))
@@ -106,7 +106,7 @@ def test_a_defect_under_the_first_window(defect):
     inverses = []
 
     def each(_: int, stepper) -> None:
-        inverses.append({(slot, kind) for _, slot, kind in stepper._odd})
+        inverses.append(set(stepper._odd))
 
     run = march("paper", *track, dt=2e-4, duration=0.004, each=each)
     first = {(int(slot), int(run.state.design[0, slot])) for slot in np.flatnonzero(run.state.design[0])}

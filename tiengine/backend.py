@@ -5,8 +5,10 @@ from __future__ import annotations
 import contextlib
 import io
 import time
+from typing import Any
 
 import taichi as ti
+from taichi.lang.ast import ast_transformer_utils
 
 _started: dict[str, float] = {}
 
@@ -23,6 +25,8 @@ def start(threads: int = 1, debug: bool = False) -> float:
     """
     if not _started:
         clock = time.perf_counter()
+        if not debug:
+            _forget_source_positions()
         with contextlib.redirect_stdout(io.StringIO()):  # ti.init prints a line whatever the log level
             ti.init(
                 arch=ti.cpu,
@@ -36,3 +40,14 @@ def start(threads: int = 1, debug: bool = False) -> float:
             )
         _started["seconds"] = time.perf_counter() - clock
     return _started["seconds"]
+
+
+def _forget_source_positions() -> None:
+    """Let Taichi translate kernels without a drawing of each expression's place in the source.
+
+    The drawings are for its messages about wrong kernels, and take two thirds of the time that a kernel found in the
+    cache on disk costs. Private API of the pinned version; another one keeps its drawings.
+    """
+    context: Any = getattr(ast_transformer_utils, "ASTTransformerContext", None)
+    if hasattr(context, "get_pos_info"):
+        context.get_pos_info = lambda self, node: ""

@@ -117,6 +117,7 @@ class Model:
         slab_push: Forces of the seats (as ``slab_seats``) to the slab's acceleration, shape (designs, 5 seats, dofs).
         slab_inverse: Inverses of the slab blocks, transposed, shape (designs, dofs, dofs).
         bed_index, bed_shape, bed_weight: Quadrature of the bed.
+        bed_points: Slab coordinates to w at all quadrature points, shape (dofs, points).
         bed_factor, bed_rest: Factors and pressures at rest by design.
         bed_lateral_K, bed_lateral_C: Lateral bed by design, shape (designs, 2, 2).
         bed_numbers: k_m, c_m, explicit, no tension.
@@ -143,6 +144,7 @@ class Model:
     bed_index: NDArray[np.int32]
     bed_shape: NDArray[np.float64]
     bed_weight: NDArray[np.float64]
+    bed_points: NDArray[np.float64]
     bed_factor: NDArray[np.float64]
     bed_rest: NDArray[np.float64]
     bed_lateral_K: NDArray[np.float64]
@@ -266,6 +268,7 @@ def _slab_arrays(given: Ingredients) -> dict[str, Any]:
         "bed_index": first.bed_index,
         "bed_shape": first.bed_shape,
         "bed_weight": first.bed_weight,
+        "bed_points": _bed_points(first),
         "bed_factor": np.stack([slab.bed_factor for slab in designs]),
         "bed_rest": np.stack([slab.bed_weight_pressure for slab in designs]),
         "bed_lateral_K": np.stack([slab.K_bed[-2:, -2:] for slab in designs]),
@@ -274,3 +277,12 @@ def _slab_arrays(given: Ingredients) -> dict[str, Any]:
             [mortar.stiffness, mortar.damping, float(given.explicit_mortar), float(mortar.no_tension)]
         ),
     }
+
+
+def _bed_points(slab: SlabMatrices) -> NDArray[np.float64]:
+    """Slab coordinates to w at the quadrature points of all elements, shape (dofs, points)."""
+    elements, points = len(slab.bed_index), len(slab.bed_shape)
+    shapes = np.zeros((slab.n, elements, points))
+    for e, index in enumerate(slab.bed_index):
+        shapes[index, e] = slab.bed_shape.T
+    return shapes.reshape(slab.n, -1)

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.contact_geometry import ContactSettings, ContactTable, build_contact_table
+from tiengine.contact_cache import contact_table
+from tiengine.contact_geometry import ContactSettings, ContactTable
 from tiengine.defects import fastening_factors
 from tiengine.integrator import Newmark
 from tiengine.model import Ingredients, SlabDesigns
@@ -73,7 +74,7 @@ def _contact(scenario: Scenario, train: TrainModel) -> ContactTable:
         hertz=scenario.contact.hertz,
         smoothing=scenario.contact.smoothing,
     )
-    return build_contact_table(parts.wheel, parts.rail_profile, settings)
+    return contact_table(parts.wheel, parts.rail_profile, settings)
 
 
 def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64]]:

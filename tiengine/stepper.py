@@ -84,10 +84,10 @@ class Stepper:
         self._speed = float("nan")
         self._window = (-1, -1)
         self._odd: list[tuple[int, int]] = []
+        self._bed_factor = self._bed_rest = np.zeros((0, 0))
         self._moves = np.zeros(0, dtype=np.bool_)
         self._body_row = -1
         self._vehicles = [state.view(row, "vehicles") for row in (at.U, at.V, at.A)]
-        self._mortar = self._bind_mortar(_ITERATE)
         self.stages = tuple(self._stages())
 
     def _launch(self, kernel: Any, *arrays: NDArray[Any]) -> Launch:
@@ -176,12 +176,24 @@ class Stepper:
         row = self._body_row
         if row < 0:
             return
-        if int(self.model.dims[at.MORTAR_MODE]) == 0:  # else known from the forces
-            self._mortar()
         bodies = self.chunk.body.shape[-1]
         for kind, view in enumerate(self._vehicles):
             self.chunk.body[:, row, kind] = view[:, :bodies]
+        if int(self.model.dims[at.MORTAR_MODE]) == 0:  # else known from the forces
+            self._find_pressures()
         self.chunk.mortar[:, row] = self.state.pressure
+
+    def _find_pressures(self) -> None:
+        """Extreme pressures of a bed that is wholly implicit: its rest and what u and v of the slabs add."""
+        m, p = self.model, self.scratch.bed_pressure
+        slabs = slice(int(m.dims[at.SLABS]), int(m.dims[at.VEHICLES]))
+        np.dot(m.bed_numbers[:2], self.state.motion[at.U : at.A, slabs], self.scratch.bed_motion)
+        np.dot(self.scratch.bed_motion.reshape(len(p), -1), m.bed_points, p)
+        p *= self._bed_factor
+        p += self._bed_rest
+        shape = self.state.pressure.shape[:2]
+        self.state.pressure[..., 0] = p.max(axis=1).reshape(shape)
+        self.state.pressure[..., 1] = p.min(axis=1).reshape(shape)
 
     def _by_design(
         self, factor: NDArray[np.float64], matrices: NDArray[np.float64], out: NDArray[np.float64], add: bool = False
@@ -256,6 +268,10 @@ class Stepper:
         if window != self._window:  # the first step too: the start has let the first slabs in
             self._window = window
             self.state.enter(self.model, *window)
+            kinds = self.state.design.ravel()
+            self._bed_factor, self._bed_rest = (
+                given.reshape(len(given), -1)[kinds] for given in (self.model.bed_factor, self.model.bed_rest)
+            )
             self._odd = [(int(slot), int(self.state.design[0, slot])) for slot in np.flatnonzero(self.state.design[0])]
         if V != self._speed and not abs(V - self._speed) < REFACTOR * self._speed:
             self.model.refactor(V)

@@ -1,0 +1,1 @@
+"""Speed: cases as data (``cases.toml``), one command that runs them: ``python -m validation.speed``."""

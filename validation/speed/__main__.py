@@ -1,0 +1,105 @@
+"""Command line: ``python -m validation.speed``."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from validation.speed import findings
+from validation.speed.command import command
+from validation.speed.effort import Effort, effort
+from validation.speed.findings import Findings
+from validation.speed.full_length import full_length
+from validation.speed.length import length
+from validation.speed.page import busy_words, page, show
+from validation.speed.roofline import roofline
+from validation.speed.runs import Facts, in_turn
+from validation.speed.scaling import scaling
+from validation.speed.throughput import batch, one_train
+
+REPORT = Path(__file__).resolve().parents[1] / "report"
+
+Rounds = Mapping[str, Sequence[Facts]]
+Tell = Callable[[str], object]
+
+
+@dataclass(frozen=True)
+class Case:
+    """Something to measure.
+
+    Attributes:
+        runs: Of ``cases.toml``, that all cases together take in turn.
+        measure: Findings from how much to measure, these runs, and a call that says what goes on.
+    """
+
+    runs: tuple[str, ...]
+    measure: Callable[[Effort, Rounds, Tell], Findings]
+
+
+CASES = {
+    "one_train": Case(("paper", "default"), lambda effort, rounds, tell: one_train(rounds)),
+    "batch": Case(("batch", "batch_one_worker", "batch_threads"), lambda effort, rounds, tell: batch(rounds)),
+    "full_length": Case(
+        ("paper", "batch", "full_20", "full_90"), lambda effort, rounds, tell: full_length(effort, rounds)
+    ),
+    "command": Case((), lambda effort, rounds, tell: command(effort)),
+    "roofline": Case((), lambda effort, rounds, tell: roofline(effort)),
+    "scaling": Case((), lambda effort, rounds, tell: scaling(effort, tell)),
+    "length": Case((), lambda effort, rounds, tell: length(effort, tell)),
+}
+
+
+@click.command()
+@click.option("--quick", is_flag=True, help="Some three minutes: fewer repeats, less distance.")
+@click.option("--long", "far", is_flag=True, help="A run of 100 km besides.")
+@click.option("--only", multiple=True, type=click.Choice(tuple(CASES)), help="Only this case; may be repeated.")
+@click.option("--draw", is_flag=True, help="Measure nothing; table, page and figures from the file as it is.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), default=REPORT, help="Folder of the report.")
+def main(quick: bool, far: bool, only: tuple[str, ...], draw: bool, output: Path) -> None:
+    """Measure the engine's speed; cases not chosen keep what was found before."""
+    from validation.speed.figures import draw as draw_figures  # here: the processes that measure do not need it
+
+    console = Console(highlight=False)
+    output.mkdir(parents=True, exist_ok=True)
+    file = output / "speed.json"
+    known = findings.read(file)
+    if not draw:
+        found = _measure(tuple(only) or tuple(CASES), effort(quick, far), console)
+        known = {name: (known | found)[name] for name in CASES if name in known or name in found}
+        findings.write(file, known)
+    rows = findings.rows(known)
+    show(rows, console)
+    figures = draw_figures(known, output)
+    (output / "speed.md").write_text(page(rows, known, figures), encoding="utf-8")
+    for name in ("speed.json", "speed.md", *figures):
+        console.print(f"wrote {output / name}")
+
+
+def _measure(chosen: Sequence[str], much: Effort, console: Console) -> dict[str, dict[str, object]]:
+    """Circumstances and findings of the chosen cases."""
+    date = time.strftime("%Y-%m-%d %H:%M")
+    start = findings.circumstances(much.name, date)
+    clock = time.perf_counter()
+
+    def tell(words: str) -> None:
+        console.print(f"{time.perf_counter() - clock:6.0f} s  {words}")
+
+    if start.busy:
+        console.print(f"[yellow]{busy_words('warning', asdict(start))}[/]")
+    runs = tuple(dict.fromkeys(run for name in chosen for run in CASES[name].runs))
+    rounds = in_turn(runs, much.rounds, much.distance, tell)
+    found = {}
+    for name in chosen:
+        tell(name.replace("_", " "))
+        found[name] = {"circumstances": asdict(start), **asdict(CASES[name].measure(much, rounds, tell))}
+    tell("done")
+    return found
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,107 @@
+"""A stepper that is given way after way to run, and timed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from tiengine.irregularity import Irregularity, make_irregularity
+from tiengine.model import Ingredients, build_model
+from tiengine.recorder import Recorder
+from tiengine.scenario import Scenario
+from tiengine.start import equilibrium
+from tiengine.state import State
+from tiengine.stepper import Chunk, Stepper
+from tiengine.timed_loop import StageTimers, Times
+
+__all__ = ["Bench", "timed_in_turn"]
+
+WARM_UP = 100  # steps
+
+
+@dataclass(eq=False)
+class Bench:
+    """The step of some trains; writing is not part of it.
+
+    Attributes:
+        scenario: Says how it starts, and what is recorded.
+        stepper: Advances them.
+        tracks: Irregularity under each.
+        recorder: Decides which steps are recorded.
+        V: Speed [m/s].
+        done: Steps so far.
+    """
+
+    scenario: Scenario
+    stepper: Stepper
+    tracks: list[Irregularity]
+    recorder: Recorder
+    V: float
+    done: int = 0
+
+    @classmethod
+    def of(cls, scenario: Scenario, given: Ingredients, steps: int) -> Bench:
+        """Set up.
+
+        Args:
+            scenario: Of one train.
+            given: What the model is made from, trains included.
+            steps: In a block.
+        """
+        V = scenario.train.speed.fastest
+        model = build_model(given, V)
+        state = State.at_rest(model)
+        equilibrium(model, state, scenario.rear, V)
+        stepper = Stepper(model, state, Chunk.empty(model, steps, steps + 1, steps + 1))
+        stepper.compile()
+        lead = scenario.rear + float(model.wheel_s.max())
+        tracks = [
+            make_irregularity(scenario.irregularity.model_copy(update={"seed": seed}), lead)
+            for seed in range(given.trains)
+        ]
+        bench = cls(scenario, stepper, tracks, Recorder(scenario, given.newmark.dt), V)
+        bench.block_us(min(WARM_UP, steps))
+        return bench
+
+    def block_us(self, steps: int) -> float:
+        """Wall time of a step of all trains [us], mean over a block; loading it included."""
+        felt, X = self._ahead(steps)
+        clock = time.perf_counter_ns()
+        self.stepper.load(X, np.full(steps, self.V), np.zeros(steps), felt)
+        for row in self.recorder.rows(self.done, steps):
+            self.stepper.step(*row)
+        spent = time.perf_counter_ns() - clock
+        self.done += steps
+        if not np.isfinite(self.stepper.state.motion).all():
+            raise RuntimeError(f"{self.scenario.name}: ran away within {self.done} steps; times would mean nothing")
+        return spent * 1e-3 / steps
+
+    def shares(self, steps: int) -> dict[str, float]:
+        """Share of each stage of the step, the largest first."""
+        timers = StageTimers(self.stepper)
+        times = Times(timers.calls)
+        felt, X = self._ahead(steps)
+        self.stepper.load(X, np.full(steps, self.V), np.zeros(steps), felt)
+        timers.run(list(self.recorder.rows(self.done, steps)), times)
+        self.done += steps
+        total = sum(times.stages.values())
+        return {name: ns / total for name, ns in sorted(times.stages.items(), key=lambda item: -item[1])}
+
+    def _ahead(self, steps: int) -> tuple[Any, Any]:
+        """Irregularity of the coming steps, and chainage of the window's rear end [m]."""
+        X = self.scenario.rear + self.V * self.recorder.dt * np.arange(self.done + 1.0, self.done + steps + 1.0)
+        model = self.stepper.model
+        wheels = (X + model.centre_s)[:, None] + model.given.train.wheelset_x
+        return np.stack([track.sample(wheels) for track in self.tracks]), X
+
+
+def timed_in_turn(benches: Sequence[Bench], rounds: int, steps: int) -> list[float]:
+    """Wall time of a step of each [us], medians over rounds in which all take a block in turn."""
+    with threadpool_limits(1):
+        spent = [[bench.block_us(steps) for bench in benches] for _ in range(rounds)]
+    return [float(x) for x in np.median(spent, axis=0)]

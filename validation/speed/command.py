@@ -1,0 +1,62 @@
+"""The whole command ``tiengine run paper`` as its user waits for it: Taichi's cache warm, and empty."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from tiengine import results
+from validation.speed.effort import Effort
+from validation.speed.findings import Findings
+from validation.speed.runs import CASES, Facts, median_of
+
+__all__ = ["command"]
+
+PARTS = ("import", "jit", "setup", "loop", "writing")
+ENTRY = "from tiengine.cli import main; main()"  # what the installed script does, wherever it is installed
+CACHE = "TI_OFFLINE_CACHE_FILE_PATH"  # Taichi's own variable for the folder of its cache
+
+
+def command(effort: Effort) -> Findings:
+    """Run it with a warm cache, several times, and once with an empty one; 600 m in both."""
+    with TemporaryDirectory(prefix="tiengine-speed-") as folder:
+        once(Path(folder), None)  # so that the cache is warm
+        warm = [once(Path(folder), None) for _ in range(effort.commands)]
+        cold = [once(Path(folder), Path(folder) / "cache")]
+    values: dict[str, Any] = {"warm_s": median_of(warm, "wall"), "cold_s": median_of(cold, "wall")}
+    for name, facts in (("warm", warm), ("cold", cold)):
+        values |= {f"{name}_{part}_s": median_of(facts, f"wall_time_{part}") for part in PARTS}
+    return Findings(values, {"warm_s": [each["wall"] for each in warm]})
+
+
+def once(folder: Path, cache: Path | None, *settings: str) -> Facts:
+    """One run of the command.
+
+    Args:
+        folder: For the result.
+        cache: Folder of Taichi's cache; None for the user's own.
+        settings: Further ``KEY=VALUE``.
+
+    Returns:
+        Attributes of the result, and ``wall``, of the whole process [s].
+    """
+    path = folder / "paper.h5"
+    common = (f"{key}={_toml(value)}" for key, value in CASES["common"].items())
+    chosen = [word for each in (*common, *settings) for word in ("--set", each)]
+    words = [sys.executable, "-c", ENTRY, "run", "paper", "--quiet", "--force", "-o", str(path), *chosen]
+    environment = os.environ | ({} if cache is None else {CACHE: str(cache)})
+    clock = time.perf_counter()
+    subprocess.run(words, check=True, env=environment)
+    wall = time.perf_counter() - clock
+    with results.open(path) as result:
+        return result.attributes | {"wall": wall}
+
+
+def _toml(value: Any) -> str:
+    """A value as ``--set`` takes it."""
+    return str(value).replace("'", '"') if isinstance(value, list) else str(value)

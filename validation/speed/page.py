@@ -1,0 +1,137 @@
+"""The report: a table on the screen, and ``speed.md``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from validation.speed.findings import Row
+
+__all__ = ["busy_words", "page", "show"]
+
+HEAD = ("case", "quantity", "measured", "target", "", "what limits it")
+VERDICTS = {True: "met", False: "MISS", None: ""}
+COLOURS = {True: "green", False: "bold red", None: "dim"}
+
+
+def show(rows: Sequence[Row], console: Console) -> None:
+    """Print the rows."""
+    table = Table(show_lines=True)
+    for name in HEAD:
+        table.add_column(name, overflow="fold")
+    for row in rows:
+        *texts, verdict, limit = _cells(row)
+        table.add_row(*map(escape, texts), f"[{COLOURS[row.met]}]{verdict}[/]", escape(limit))
+    console.print(table)
+
+
+def page(rows: Sequence[Row], cases: Mapping[str, Any], figures: Sequence[str]) -> str:
+    """Markdown.
+
+    Args:
+        rows: What was held to targets.
+        cases: Findings by case, with their circumstances.
+        figures: Files beside the page.
+    """
+    judged = [row for row in rows if row.met is not None]
+    lines = [
+        "# Speed",
+        "",
+        f"{sum(bool(row.met) for row in judged)} of {len(judged)} targets met. Real-time factor (RTF): wall time over",
+        "simulated time, of the loop, writing included. Medians; runs that are compared took turns.",
+        "Written by `python -m validation.speed`.",
+        "",
+        *_circumstances(cases),
+        "",
+        *_table(HEAD, [_cells(row) for row in rows]),
+    ]
+    if "scaling" in cases:
+        lines += ["", "**What a step costs**, by whole and upper range, and its largest stages at the last point", ""]
+        lines += _scaling(cases["scaling"]["data"])
+    if "full_length" in cases:
+        lines += ["", "**A step of the full-length model** [us]", "", *_full_length(cases["full_length"]["data"])]
+    if "length" in cases:
+        lines += ["", "**Kilometres**, few outputs", "", *_lengths(cases["length"]["data"]["lengths"])]
+    pictures = [f"![{name.removesuffix('.png').replace('_', ' ')}]({name})" for name in figures]
+    return "\n".join([*lines, "", *pictures]) + "\n"
+
+
+def busy_words(case: str, seen: Mapping[str, Any]) -> str:
+    """A warning, for a case that was measured on a busy machine."""
+    return f"{case}: other processes used {seen['others_cores']:.1f} cores at the start; absolute times are too long"
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    unit = f" {row.unit}" if row.unit else ""
+    bound = "≤" if row.rule == "at most" else "≥"
+    target = "" if row.target is None else f"{bound} {row.target:g}{unit}"
+    return (row.case.replace("_", " "), row.quantity, f"{row.measured:.3g}{unit}", target, VERDICTS[row.met], row.limit)
+
+
+def _circumstances(cases: Mapping[str, Any]) -> Iterator[str]:
+    """Machine and versions once if all cases share them, then date and load of each."""
+    seen = {name: found["circumstances"] for name, found in cases.items()}
+    for machine in {_machine(each): None for each in seen.values()}:
+        yield f"{machine}"
+    yield ""
+    yield from _table(
+        ("case", "measured", "effort", "load average at the start", "cores used by others then"),
+        [
+            (name.replace("_", " "), each["date"], each["effort"], f"{each['load_average']:.2f}",
+             f"{each['others_cores']:.2f}")
+            for name, each in seen.items()
+        ],
+    )  # fmt: skip
+
+
+def _machine(seen: Mapping[str, Any]) -> str:
+    machine = seen["machine"]
+    versions = ", ".join(f"{name} {version}" for name, version in seen["versions"].items())
+    memory = machine["memory_bytes"] / 2**30
+    return f"{machine['cpu']}, {machine['cores']} cores, {memory:.0f} GiB; {machine['blas']}; {versions}."
+
+
+def _scaling(data: Mapping[str, Any]) -> list[str]:
+    body = [
+        (
+            axis["words"],
+            ", ".join(f"{x:g}: {us:.0f}" for x, us in zip(axis["x"], axis["us"], strict=True)),
+            f"{axis['exponent']:.2f}",
+            f"{axis['exponent_upper']:.2f}",
+            _largest(axis["shares_last"]),
+        )
+        for axis in data.values()
+        if "shares_last" in axis
+    ]
+    for kind, words in (("interval", "steps between samples of everything"), ("channels", "channels of a wheel")):
+        axis = data["outputs"][kind]
+        values = ", ".join(f"{x:g}: {us:.0f}" for x, us in zip(axis["x"], axis["us"], strict=True))
+        body.append((words, values, f"{axis['exponent']:.2f}", "", "writing and recording"))
+    return _table(("against", "us a step (trains: a train-step)", "exponent", "upper half", "largest stages"), body)
+
+
+def _largest(shares: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {share:.0%}" for name, share in list(shares.items())[:3])
+
+
+def _full_length(data: Mapping[str, Any]) -> list[str]:
+    profiles = data["profiles"]
+    names = list(dict.fromkeys(name for each in profiles.values() for name in each["stages_us_per_step"]))
+    body = [
+        (name, *(f"{each['stages_us_per_step'].get(name, 0.0):.0f}" for each in profiles.values())) for name in names
+    ]
+    body.append(("whole step", *(f"{each['us_per_step']:.0f}" for each in profiles.values())))
+    return _table(("stage", *(f"{modes} modes a slab" for modes in profiles)), body)
+
+
+def _lengths(rows: Sequence[Mapping[str, float]]) -> list[str]:
+    keys = ("length_km", "loop_s", "loop_s_per_km", "rtf", "peak_memory_mb", "file_mb")
+    return _table(keys, [tuple(f"{row[key]:.4g}" for key in keys) for row in rows])
+
+
+def _table(head: Sequence[str], body: Sequence[Sequence[str]]) -> list[str]:
+    return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *body)]

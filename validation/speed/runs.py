@@ -1,0 +1,126 @@
+"""Runs of the engine and of the full-length model, each in a process of its own, in turn where they are compared.
+
+A process sets up once and then runs again and again, so that only the first of several runs pays for kernels and
+contact table; neither is part of what is compared.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import tomllib
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
+
+__all__ = ["CASES", "RUNS", "Facts", "Run", "apart", "in_turn", "median_of", "perform", "settings_of"]
+
+T = TypeVar("T")
+Facts = dict[str, Any]
+CASES = tomllib.loads((Path(__file__).parent / "cases.toml").read_text(encoding="utf-8"))
+
+RAIL = 600.0  # m, of the full-length model
+MODES_PER_METRE = 2.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run, as ``cases.toml`` has it.
+
+    Attributes:
+        words: What it is.
+        scenario: Built-in scenario.
+        settings: Keys to change.
+        workers: Processes.
+        slab_modes: Plate modes a slab of the full-length model; None for the engine.
+    """
+
+    words: str
+    scenario: str
+    settings: dict[str, Any] = field(default_factory=dict)
+    workers: int = 1
+    slab_modes: int | None = None
+
+
+RUNS = {name: Run(**table) for name, table in CASES["runs"].items()}
+
+
+def settings_of(run: Run, distance: float) -> dict[str, Any]:
+    """Keys to change for a way of so many metres."""
+    return CASES["common"] | run.settings | {"train.distance": distance}
+
+
+def perform(run: Run, distance: float) -> Facts:
+    """Run in this process, into a temporary file.
+
+    Args:
+        run: What.
+        distance: Way [m].
+
+    Returns:
+        Attributes of the result, times in s, memory in MB, and ``file_mb``.
+    """
+    from tiengine.memory import peak_memory  # here: the parent measures nothing and imports little
+    from tiengine.scenario import load_scenario
+    from tiengine.simulate import run as simulate
+    from validation.msm.simulate import FullLength, run_full_length
+
+    scenario = load_scenario(run.scenario, settings_of(run, distance))
+    with TemporaryDirectory(prefix="tiengine-speed-") as folder:
+        path = Path(folder) / "run.h5"
+        if run.slab_modes is None:
+            result = simulate(scenario, path, workers=run.workers)
+        else:
+            numerics = FullLength(RAIL, MODES_PER_METRE, run.slab_modes, float(scenario.numerics.time_step))
+            result = run_full_length(scenario, numerics, path)
+        with result:
+            facts: Facts = result.attributes
+        del facts["scenario"]
+        facts.setdefault("peak_memory", peak_memory())
+        return facts | {"file_mb": path.stat().st_size * 1e-6}
+
+
+def in_turn(
+    names: Sequence[str], rounds: int, distance: float, tell: Callable[[str], object]
+) -> dict[str, list[Facts]]:
+    """Run several, one after another, round by round.
+
+    Args:
+        names: Of runs.
+        rounds: How often each.
+        distance: Way [m].
+        tell: Called with words on what comes next.
+    """
+    facts: dict[str, list[Facts]] = {name: [] for name in names}
+    with ExitStack() as stack:
+        processes = {name: stack.enter_context(_process()) for name in names}
+        for i in range(rounds):
+            for name, process in processes.items():
+                tell(f"{RUNS[name].words}, round {i + 1} of {rounds}")
+                facts[name].append(process.submit(perform, RUNS[name], distance).result())
+    return facts
+
+
+def apart(call: Callable[..., T], *arguments: Any) -> T:
+    """Call in a fresh process."""
+    with _process() as process:
+        return process.submit(call, *arguments).result()
+
+
+def median_of(facts: Sequence[Facts], key: str) -> float:
+    """Median over repeated runs."""
+    return float(median(float(each[key]) for each in facts))
+
+
+def _process() -> ProcessPoolExecutor:
+    """A process that works when asked; spawned, since Taichi does not outlive a fork."""
+    return ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet)
+
+
+def _quiet() -> None:
+    os.environ["ENABLE_TAICHI_HEADER_PRINT"] = "False"

@@ -1,0 +1,140 @@
+"""What a step costs over modes, window, slabs, outputs and trains, with fitted exponents."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from validation.speed.effort import Effort
+from validation.speed.findings import Findings
+from validation.speed.runs import RUNS, apart, settings_of
+
+__all__ = ["AXES", "Axis", "exponent", "scaling"]
+
+PITCH = 5.67  # m, of the slabs
+MODES = 60
+PER_METRE = 60 / 36.0
+WAY = 600.0  # m, of the scenarios; a bench runs as far as it is told
+SETTLED = 0.5
+"""A power law is fitted over all points, and over the upper half, where constant costs matter less."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Something to vary.
+
+    Attributes:
+        words: What it is.
+        x: Its values.
+        change: Fields of the engine's ingredients at a value.
+        unit: What a time is divided by: "step" of all trains, or "train-step".
+    """
+
+    words: str
+    x: tuple[float, ...]
+    change: Callable[[float], dict[str, Any]]
+    unit: str = "step"
+
+
+AXES = {
+    "modes": Axis("modes N of a rail field, window 36 m", (30, 60, 120, 240), lambda n: {"modes": int(n)}),
+    "window": Axis(
+        "window [m], 1.67 modes a metre",
+        (28, 40, 60, 84, 120),
+        lambda length: {"length": float(length), "modes": round(PER_METRE * length)},
+    ),
+    "slabs": Axis(
+        "slabs, 60 modes, window as long as they are",
+        (6, 8, 12, 16, 24),
+        lambda slabs: {"length": (slabs - 1.5) * PITCH, "modes": MODES},  # a window touches one more than it is long
+    ),
+    "trains": Axis(
+        "trains together, one process", (1, 2, 4, 8, 16, 32, 64), lambda trains: {"trains": int(trains)}, "train-step"
+    ),
+}
+INTERVALS = (1, 2, 5, 10, 50)  # steps between two samples of everything
+CHANNELS = (1, 3, 6, 10, 14)  # of each wheel, every step
+
+
+def scaling(effort: Effort, tell: Callable[[str], object]) -> Findings:
+    """Measure every axis in a process of its own."""
+    data = {}
+    for name, axis in AXES.items():
+        tell(axis.words)
+        data[name] = apart(measure_axis, name, effort.bench_rounds, effort.bench_steps)
+    tell("recorded outputs")
+    data["outputs"] = apart(measure_outputs, effort.rounds, effort.distance)
+    values = {f"{name}_exponent": found["exponent"] for name, found in data.items() if "exponent" in found}
+    return Findings({**values, **data["outputs"]["values"]}, data)
+
+
+def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
+    """Time of a step at every value of an axis [us], and what of it is largest at the last."""
+    from tiengine import backend  # here: the parent starts no Taichi
+    from tiengine.scenario import load_scenario
+    from tiengine.setup import ingredients
+    from validation.speed.bench import Bench, timed_in_turn
+
+    backend.start()
+    axis = AXES[name]
+    scenario = load_scenario("paper", settings_of(RUNS["paper"], WAY))
+    given = ingredients(scenario, float(scenario.numerics.time_step))
+    benches = [Bench.of(scenario, replace(given, **axis.change(x)), steps) for x in axis.x]
+    us = timed_in_turn(benches, rounds, steps)
+    if axis.unit == "train-step":
+        us = [each / x for each, x in zip(us, axis.x, strict=True)]
+    return {
+        "words": axis.words,
+        "unit": axis.unit,
+        "x": list(axis.x),
+        "us": us,
+        "exponent": exponent(axis.x, us),
+        "exponent_upper": exponent(*_upper(axis.x, us)),
+        "shares_first": benches[0].shares(steps),
+        "shares_last": benches[-1].shares(steps),
+    }
+
+
+def measure_outputs(rounds: int, distance: float) -> dict[str, Any]:
+    """Time of a step of whole runs [us], over the interval of all outputs and over the channels of a wheel."""
+    from tiengine.channels import WHEEL
+    from tiengine.scenario import load_scenario
+    from tiengine.simulate import run as simulate
+
+    dt, names = 2e-4, list(WHEEL)
+    chosen: dict[tuple[str, int], dict[str, Any]] = {}
+    for every in INTERVALS:
+        chosen["interval", every] = {"output.wheel_interval": every * dt, "output.body_interval": every * dt}
+    for count in CHANNELS:
+        chosen["channels", count] = {"output.wheel_channels": names[:count]}
+    spent: dict[tuple[str, int], list[float]] = {key: [] for key in chosen}
+    for _ in range(rounds):
+        for key, settings in chosen.items():
+            scenario = load_scenario("paper", settings_of(RUNS["paper"], distance) | settings)
+            with simulate(scenario, workers=1) as result:
+                facts = result.attributes
+            spent[key].append(1e6 * facts["wall_time_loop"] / facts["steps"])
+    us = {key: float(np.median(times)) for key, times in spent.items()}
+    interval, channels = ([us[kind, x] for x in xs] for kind, xs in (("interval", INTERVALS), ("channels", CHANNELS)))
+    return {
+        "interval": {"x": list(INTERVALS), "us": interval, "exponent": exponent(INTERVALS, interval)},
+        "channels": {"x": list(CHANNELS), "us": channels, "exponent": exponent(CHANNELS, channels)},
+        "values": {
+            "outputs_interval_exponent": exponent(INTERVALS, interval),
+            "outputs_channels_exponent": exponent(CHANNELS, channels),
+            "outputs_us_per_channel": float(np.polyfit(CHANNELS, channels, 1)[0]),
+        },
+    }
+
+
+def exponent(x: Sequence[float], y: Sequence[float]) -> float:
+    """Exponent p of y = c x^p by least squares of logarithms."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def _upper(x: Sequence[float], y: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+    first = int(SETTLED * (len(x) - 1))
+    return x[first:], y[first:]
