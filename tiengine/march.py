@@ -202,6 +202,7 @@ class _Run:
         with np.errstate(over="ignore", invalid="ignore"):  # numbers that run away stay in the rows of their train
             for step in recorder.rows(done, len(x)):
                 self.stepper.step(*step)
+            self.stepper.fill_pressures(recorder.body_rows(done, len(x)))
         self.steps[self.alive] += len(x)
         found = check_chunk(self.model, chunk, recorder, done + 1, x)
         blocks = recorder.blocks(chunk, done + 1, x, self.alive)

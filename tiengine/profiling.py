@@ -29,7 +29,7 @@ from tiengine.quantity import InputError
 from tiengine.recorder import Recorder
 from tiengine.roofs import Roofs, measure_roofs
 from tiengine.scenario import Scenario, load_scenario, to_toml
-from tiengine.stage_split import contact_us, mortar_us, suspension_us
+from tiengine.stage_split import contact_us, suspension_us
 from tiengine.start import equilibrium, release
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper
@@ -40,9 +40,8 @@ __all__ = ["array_bytes", "profile"]
 
 WARM_UP_STEPS = 300
 
-HOME = {"mortar": "recording", "suspension": "fastening kernel", "contact": "fastening kernel"}
-"""Parts without a stage of their own, and the stage from whose time their estimate is taken off. A bed that is wholly
-implicit needs the mortar only where its pressures are recorded; any other is a stage."""
+HOME = {"suspension": "fastening kernel", "contact": "fastening kernel"}
+"""Parts without a stage of their own, and the stage from whose time their estimate is taken off."""
 
 ORDER = ("window and seats", "irregularity", "predictors and correctors", "linear forces", "motion at the seats",
          "fastening kernel", "suspension", "contact", "mortar", "implicit solve", "recording", "checks",
@@ -179,10 +178,8 @@ def _measure(loop: TimedLoop, wall: Wall, steps: int) -> ProfileReport:
 def _parts(loop: TimedLoop) -> dict[str, tuple[float, float]]:
     """Calls a step and time [us a train-step] of parts that share a stage with others."""
     model, state = loop.stepper.model, loop.stepper.state
-    mortar = 1.0 / loop.recorder.body_every
     passes = model.given.passes
     return {
-        "mortar": (mortar, mortar * mortar_us(model, state)),
         "suspension": (passes, passes * suspension_us(model, state)),
         "contact": (passes, passes * contact_us(loop.stepper)),
     }

@@ -94,6 +94,10 @@ class Recorder:
             wheel_row += wheels
             body_row += bodies
 
+    def body_rows(self, done: int, count: int) -> int:
+        """Rows of the bodies' record that ``count`` steps after ``done`` fill."""
+        return (done + count) // self.body_every - done // self.body_every
+
     def groups(self) -> dict[str, GroupSpec]:
         """What each train records."""
         return self.groups_of(self.scenario)

@@ -29,7 +29,6 @@ class Scratch:
             shape (2, B, slots, 5, n).
         slab_force: Forces of the seats on the slabs, shape (B, slots, 5, n).
         bed_motion: Bed's k u + c v of the slabs, shape (B slots dofs,).
-        bed_pressure: Pressures at the bed's quadrature points [Pa], shape (B slots, points).
         damped: Acceleration of slabs, then trains, by their own damping, shape (columns,).
         rail_predicted: Rails under the wheels at the predictors: w, v, theta_x, slopes, rates, shape (B, W, 2, 9).
     """
@@ -43,7 +42,6 @@ class Scratch:
     slab_pull: NDArray[np.float64]
     slab_force: NDArray[np.float64]
     bed_motion: NDArray[np.float64]
-    bed_pressure: NDArray[np.float64]
     damped: NDArray[np.float64]
     rail_predicted: NDArray[np.float64]
 
@@ -63,7 +61,6 @@ class Scratch:
             slab_pull=np.zeros((2, B, slots, 5, per_slab)),
             slab_force=np.zeros((B, slots, 5, per_slab)),
             bed_motion=np.zeros(B * slots * dofs),
-            bed_pressure=np.zeros((B * slots, model.bed_points.shape[1])),
             damped=np.zeros(B * (slots * dofs + vehicle)),
             rail_predicted=np.zeros((B, W, 2, 9)),
         )

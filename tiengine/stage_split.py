@@ -1,6 +1,6 @@
 """Estimates for parts of the step that share a launch with others and cannot be timed in it.
 
-Mortar and suspension run alone, by their stand-alone kernels, on the live state of one train copied many times: the
+The suspension runs alone, by its stand-alone kernel, on the live state of one train copied many times: the
 difference between many copies and one, over their number, is free of the cost of a public launch. Caches are warmer
 than in the step. Contact is what the launch takes longer with wheels than without; it starts from forces that it has
 found before, an iteration less than in the step at times.
@@ -14,15 +14,14 @@ from collections.abc import Callable
 import numpy as np
 
 from tiengine.kernels import layout as at
-from tiengine.kernels.mortar import add_bed_forces
 from tiengine.kernels.suspension import suspension_forces
 from tiengine.model import Model
 from tiengine.state import State
 from tiengine.stepper import Stepper
 
-__all__ = ["contact_us", "mortar_us", "suspension_us"]
+__all__ = ["contact_us", "suspension_us"]
 
-SLAB_COPIES, TRAIN_COPIES = 65, 501  # near a second-level cache's size; below the 512 that Taichi gives one thread
+TRAIN_COPIES = 501  # below the 512 that Taichi gives one thread
 REPEATS = 40
 
 
@@ -43,25 +42,6 @@ def contact_us(stepper: Stepper) -> float:
         array[:] = before
     without, with_wheels = np.median(taken, axis=0)
     return max(0.0, float(with_wheels - without)) * 1e-3 / int(dims[at.TRAINS])
-
-
-def mortar_us(model: Model, state: State) -> float:
-    """One evaluation of the bed under one train's slabs [us]."""
-    slots, n = int(model.dims[at.SLOTS]), int(model.dims[at.SLAB_DOFS])
-    k, c, explicit, no_tension = model.bed_numbers
-    slabs = np.stack([state.view(row, "slabs")[0].ravel() for row in (at.U, at.V, at.F)])
-    start = np.arange(slots, dtype=np.int32) * n
-
-    def evaluate(trains: int) -> Callable[[], object]:
-        design, motion = np.repeat(state.design[:1], trains, axis=0), np.tile(slabs, trains)
-        pressure = np.zeros((trains, slots, 2))
-        return lambda: add_bed_forces(
-            trains, slots * n, n, start, design, model.bed_index, model.bed_shape, model.bed_weight, model.bed_factor,
-            model.bed_rest, model.bed_lateral_K, model.bed_lateral_C, k, c, int(explicit), int(no_tension), motion,
-            pressure,
-        )  # fmt: skip
-
-    return _by_difference(evaluate, SLAB_COPIES)
 
 
 def suspension_us(model: Model, state: State) -> float:

@@ -21,7 +21,8 @@ from tiengine.state import State, positions
 __all__ = ["Chunk", "Stepper"]
 
 REFACTOR = 1e-3
-"""Relative change of speed at which the blocks are factorised anew; in between only A, not the forces, is stale."""
+"""Relative change of speed at which what depends on it is made anew; in between the implicit blocks and the small
+gyroscopic coupling of the wheelsets' mean spin are a thousandth old, all other forces are not."""
 
 
 @dataclass(eq=False)
@@ -34,6 +35,8 @@ class Chunk:
         wheel: Recorded wheel output, shape (B, rows, W, 2, N_WHEEL).
         body: Recorded displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
         mortar: Largest and smallest pressure of each slab [Pa], with the bodies, shape (B, rows, slots, 2).
+        bed: What the bed feels then, k u + c v of all slab coordinates, shape (B, rows, slots dofs).
+        design: Design of the slab in each slot then, shape (rows, slots).
     """
 
     clock: NDArray[np.float64]
@@ -41,18 +44,22 @@ class Chunk:
     wheel: NDArray[np.float64]
     body: NDArray[np.float64]
     mortar: NDArray[np.float64]
+    bed: NDArray[np.float64]
+    design: NDArray[np.int32]
 
     @classmethod
     def empty(cls, model: Model, steps: int, wheel_rows: int, body_rows: int) -> Chunk:
         """Buffers for ``steps`` steps of which some are recorded."""
         d = model.dims
-        B, W, bodies = int(d[at.TRAINS]), int(d[at.WHEELSETS]), int(d[at.BODIES])
+        B, W, bodies, slots = (int(d[size]) for size in (at.TRAINS, at.WHEELSETS, at.BODIES, at.SLOTS))
         return cls(
             clock=np.zeros((steps, at.N_CLOCK)),
             irregularity=np.zeros((B, steps, W, at.N_IRREGULARITY)),
             wheel=np.zeros((B, max(wheel_rows, 1), W, 2, at.N_WHEEL)),
             body=np.zeros((B, max(body_rows, 1), 3, 5 * bodies)),
-            mortar=np.zeros((B, max(body_rows, 1), int(d[at.SLOTS]), 2)),
+            mortar=np.zeros((B, max(body_rows, 1), slots, 2)),
+            bed=np.zeros((B, max(body_rows, 1), slots * int(d[at.SLAB_DOFS]))),
+            design=np.zeros((max(body_rows, 1), slots), dtype=np.int32),
         )
 
 
@@ -84,7 +91,7 @@ class Stepper:
         self._speed = float("nan")
         self._window = (-1, -1)
         self._odd: list[tuple[int, int]] = []
-        self._bed_factor = self._bed_rest = np.zeros((0, 0))
+        self._slabs = slice(int(model.dims[at.SLABS]), int(model.dims[at.VEHICLES]))
         self._moves = np.zeros(0, dtype=np.bool_)
         self._body_row = -1
         self._vehicles = [state.view(row, "vehicles") for row in (at.U, at.V, at.A)]
@@ -172,28 +179,36 @@ class Stepper:
         )  # fmt: skip
 
     def _record_bodies(self) -> None:
-        """Copy the bodies' motion and the bed's pressures, if this step is asked for them."""
+        """Copy the bodies' motion and what the bed feels, if this step is asked for them."""
         row = self._body_row
         if row < 0:
             return
-        bodies = self.chunk.body.shape[-1]
+        chunk, bodies = self.chunk, self.chunk.body.shape[-1]
         for kind, view in enumerate(self._vehicles):
-            self.chunk.body[:, row, kind] = view[:, :bodies]
-        if int(self.model.dims[at.MORTAR_MODE]) == 0:  # else known from the forces
-            self._find_pressures()
-        self.chunk.mortar[:, row] = self.state.pressure
+            chunk.body[:, row, kind] = view[:, :bodies]
+        if int(self.model.dims[at.MORTAR_MODE]) > 0:
+            chunk.mortar[:, row] = self.state.pressure
+        else:
+            np.dot(self.model.bed_numbers[:2], self.state.motion[at.U : at.A, self._slabs], self.scratch.bed_motion)
+            chunk.bed[:, row] = self.scratch.bed_motion.reshape(len(chunk.bed), -1)
+            chunk.design[row] = self.state.design[0]
 
-    def _find_pressures(self) -> None:
-        """Extreme pressures of a bed that is wholly implicit: its rest and what u and v of the slabs add."""
-        m, p = self.model, self.scratch.bed_pressure
-        slabs = slice(int(m.dims[at.SLABS]), int(m.dims[at.VEHICLES]))
-        np.dot(m.bed_numbers[:2], self.state.motion[at.U : at.A, slabs], self.scratch.bed_motion)
-        np.dot(self.scratch.bed_motion.reshape(len(p), -1), m.bed_points, p)
-        p *= self._bed_factor
-        p += self._bed_rest
-        shape = self.state.pressure.shape[:2]
-        self.state.pressure[..., 0] = p.max(axis=1).reshape(shape)
-        self.state.pressure[..., 1] = p.min(axis=1).reshape(shape)
+    def fill_pressures(self, rows: int) -> None:
+        """Extreme pressures of a bed that is wholly implicit in the first ``rows`` of the bodies' record.
+
+        At rest they are the slab's weight's; k u + c v adds to that. One product for a whole chunk of steps.
+        """
+        m, chunk = self.model, self.chunk
+        if rows == 0 or int(m.dims[at.MORTAR_MODE]) > 0:  # then they are known from the forces
+            return
+        kinds = chunk.design[:rows].ravel()
+        factor, rest = (given.reshape(len(given), -1)[kinds] for given in (m.bed_factor, m.bed_rest))
+        for bed, out in zip(chunk.bed[:, :rows], chunk.mortar[:, :rows], strict=True):
+            pressure = bed.reshape(len(kinds), -1) @ m.bed_points
+            pressure *= factor
+            pressure += rest
+            out[..., 0] = pressure.max(axis=1).reshape(out.shape[:2])
+            out[..., 1] = pressure.min(axis=1).reshape(out.shape[:2])
 
     def _by_design(
         self, factor: NDArray[np.float64], matrices: NDArray[np.float64], out: NDArray[np.float64], add: bool = False
@@ -268,10 +283,6 @@ class Stepper:
         if window != self._window:  # the first step too: the start has let the first slabs in
             self._window = window
             self.state.enter(self.model, *window)
-            kinds = self.state.design.ravel()
-            self._bed_factor, self._bed_rest = (
-                given.reshape(len(given), -1)[kinds] for given in (self.model.bed_factor, self.model.bed_rest)
-            )
             self._odd = [(int(slot), int(self.state.design[0, slot])) for slot in np.flatnonzero(self.state.design[0])]
         if V != self._speed and not abs(V - self._speed) < REFACTOR * self._speed:
             self.model.refactor(V)

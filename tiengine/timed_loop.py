@@ -216,6 +216,8 @@ class TimedLoop:
             for begin in range(0, count, 2 * block):
                 self._pair(rows[begin : begin + block], rows[begin + block : begin + 2 * block], times)
             lap(None)
+            self.stepper.fill_pressures(self.recorder.body_rows(self.done, count))
+            lap("mortar")
             failures = check_chunk(self.stepper.model, self.stepper.chunk, self.recorder, self.done + 1, x)
             if failures:
                 raise RunFailedError("; ".join(f"train {b}: {why}" for b, why in failures.items()))

@@ -23,6 +23,7 @@ from validation.speed.scaling import scaling
 from validation.speed.throughput import batch, one_train
 
 REPORT = Path(__file__).resolve().parents[1] / "report"
+PIPE_WIDTH = 160  # columns where there is no terminal
 
 Rounds = Mapping[str, Sequence[Facts]]
 Tell = Callable[[str], object]
@@ -55,7 +56,7 @@ CASES = {
 
 
 @click.command()
-@click.option("--quick", is_flag=True, help="Some three minutes: fewer repeats, less distance.")
+@click.option("--quick", is_flag=True, help="Some four minutes: fewer repeats, less distance.")
 @click.option("--long", "far", is_flag=True, help="A run of 100 km besides.")
 @click.option("--only", multiple=True, type=click.Choice(tuple(CASES)), help="Only this case; may be repeated.")
 @click.option("--draw", is_flag=True, help="Measure nothing; table, page and figures from the file as it is.")
@@ -65,6 +66,8 @@ def main(quick: bool, far: bool, only: tuple[str, ...], draw: bool, output: Path
     from validation.speed.figures import draw as draw_figures  # here: the processes that measure do not need it
 
     console = Console(highlight=False)
+    if not console.is_terminal:
+        console = Console(highlight=False, width=PIPE_WIDTH)
     output.mkdir(parents=True, exist_ok=True)
     file = output / "speed.json"
     known = findings.read(file)

@@ -36,10 +36,10 @@ def effort(quick: bool, far: bool) -> Effort:
     """Choose.
 
     Args:
-        quick: Some three minutes.
+        quick: Some four minutes.
         far: 100 km besides.
     """
     if quick:
-        return Effort("quick", 2, 40.0, 1, (0.5, 1.0, 2.0), 3, 60, 2000)
+        return Effort("quick", 2, 20.0, 1, (0.25, 0.5, 1.0), 3, 60, 1000)
     lengths = (5.0, 10.0, 20.0, 100.0) if far else (5.0, 10.0, 20.0)
-    return Effort("long" if far else "whole", 5, 100.0, 3, lengths, 7, 150, 10000)
+    return Effort("long" if far else "whole", 5, 40.0, 3, lengths, 7, 150, 5000)

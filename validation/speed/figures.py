@@ -21,6 +21,7 @@ OURS, FULL, OTHERS, BEST = "#0072B2", "#56B4E9", "#999999", "#D55E00"  # of Okab
 STAGE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
 
 LEFT = 0.01  # where bars begin
+TICKS = [tick * 10**decade for decade in (1, 2, 3) for tick in (1, 1.5, 2, 3, 5, 7)]
 
 Cases = Mapping[str, Any]
 
@@ -58,8 +59,11 @@ def _factors(cases: Cases) -> Any:
         axis.barh(
             place, high - (low if low < high else 0.01), left=low if low < high else 0.01, height=0.6, color=colour
         )
-        number = f"{low:g}–{high:g}" if low < high else f"{high:.3g}"
-        axis.text(high * 1.12, place, number, va="center", fontsize=9)
+        number = f"{low:g}–{high:g}" if low < high else f"{float(f'{high:.3g}'):g}" if high < 1000.0 else f"{high:.0f}"
+        axis.text(
+            high * 1.08, place, number, va="center", fontsize=9,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+        )  # fmt: skip
         axis.text(-0.01, place + 0.12, label, va="center", ha="right", fontsize=9, transform=axis.get_yaxis_transform())
         axis.text(
             -0.01, place - 0.22, source, va="center", ha="right", fontsize=7, color="0.4",
@@ -115,8 +119,8 @@ def _scaling(cases: Cases) -> Any:
         axis.set_xticks(x, [f"{each:g}" for each in x])
         axis.minorticks_off()
         low, high = us.min() / 1.5, us.max() * 1.5
-        ticks = [tick for tick in (10, 20, 50, 100, 200, 500, 1000, 2000, 5000) if low < tick < high]
-        axis.set_yticks(ticks, [str(tick) for tick in ticks])
+        ticks = [tick for tick in TICKS if low < tick < high]
+        axis.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
         axis.set(xlabel=found["words"], ylabel=f"us a {found['unit']}", ylim=(low, high))
         if "shares_last" in found:
             shares = list(found["shares_last"].items())[:2]

@@ -16,7 +16,7 @@ def length(effort: Effort, tell: Callable[[str], object]) -> Findings:
     table = []
     for km in effort.lengths_km:
         tell(f"{km:g} km")
-        facts = apart(perform, RUNS["way"], 1e3 * km)
+        (facts,) = apart(perform, (RUNS["way"], 1e3 * km))
         table.append(
             {
                 "length_km": km,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from statistics import median
 from typing import Any
 
 from rich.console import Console
@@ -10,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from validation.speed.findings import Row
+from validation.speed.runs import RUNS
 
 __all__ = ["busy_words", "page", "show"]
 
@@ -49,6 +51,7 @@ def page(rows: Sequence[Row], cases: Mapping[str, Any], figures: Sequence[str]) 
         "",
         *_table(HEAD, [_cells(row) for row in rows]),
     ]
+    lines += ["", "**Rounds**: real-time factors (batches: per train)", "", *_rounds(cases)]
     if "scaling" in cases:
         lines += ["", "**What a step costs**, by whole and upper range, and its largest stages at the last point", ""]
         lines += _scaling(cases["scaling"]["data"])
@@ -93,6 +96,17 @@ def _machine(seen: Mapping[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in seen["versions"].items())
     memory = machine["memory_bytes"] / 2**30
     return f"{machine['cpu']}, {machine['cores']} cores, {memory:.0f} GiB; {machine['blas']}; {versions}."
+
+
+def _rounds(cases: Mapping[str, Any]) -> list[str]:
+    """Spread of the rounds of every run."""
+    body = []
+    for found in cases.values():
+        for run, factors in found["data"].get("rtf_rounds", {}).items():
+            ordered = sorted(factors)
+            numbers = (ordered[0], median(ordered), ordered[-1])
+            body.append((RUNS[run].words, str(len(ordered)), *(f"{x:.3f}" for x in numbers)))
+    return _table(("run", "rounds", "least", "median", "largest"), body)
 
 
 def _scaling(data: Mapping[str, Any]) -> list[str]:

@@ -47,7 +47,7 @@ AXES = {
         lambda length: {"length": float(length), "modes": round(PER_METRE * length)},
     ),
     "slabs": Axis(
-        "slabs, 60 modes, window as long as they are",
+        "slabs (60 modes, window as long)",
         (6, 8, 12, 16, 24),
         lambda slabs: {"length": (slabs - 1.5) * PITCH, "modes": MODES},  # a window touches one more than it is long
     ),
@@ -60,13 +60,11 @@ CHANNELS = (1, 3, 6, 10, 14)  # of each wheel, every step
 
 
 def scaling(effort: Effort, tell: Callable[[str], object]) -> Findings:
-    """Measure every axis in a process of its own."""
-    data = {}
-    for name, axis in AXES.items():
-        tell(axis.words)
-        data[name] = apart(measure_axis, name, effort.bench_rounds, effort.bench_steps)
+    """Measure every axis, then outputs."""
+    calls = [(name, effort.bench_rounds, effort.bench_steps) for name in AXES]
+    data = dict(zip(AXES, apart(measure_axis, *calls), strict=True))
     tell("recorded outputs")
-    data["outputs"] = apart(measure_outputs, effort.rounds, effort.distance)
+    (data["outputs"],) = apart(measure_outputs, (effort.rounds, effort.distance))
     values = {f"{name}_exponent": found["exponent"] for name, found in data.items() if "exponent" in found}
     return Findings({**values, **data["outputs"]["values"]}, data)
 

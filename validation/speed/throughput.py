@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from validation.speed.findings import Findings
 from validation.speed.runs import Facts, median_of
 
-__all__ = ["batch", "one_train", "step_us"]
+__all__ = ["batch", "factors", "one_train", "step_us"]
 
 Rounds = Mapping[str, Sequence[Facts]]
 
@@ -30,7 +30,7 @@ def one_train(rounds: Rounds) -> Findings:
             "dofs_default": float(default[0]["dofs"]),
             "peak_memory_mb": median_of(paper, "peak_memory"),
         },
-        {"rtf_rounds": _factors(rounds, ("paper", "default"))},
+        {"rtf_rounds": factors(rounds, ("paper", "default"))},
     )
 
 
@@ -50,11 +50,12 @@ def batch(rounds: Rounds) -> Findings:
             "peak_memory_mb": median_of(rounds["batch"], "peak_memory"),
             "peak_memory_one_worker_mb": median_of(rounds["batch_one_worker"], "peak_memory"),
         },
-        {"rtf_rounds": _factors(rounds, _BATCHES)},
+        {"rtf_rounds": factors(rounds, _BATCHES)},
     )
 
 
-def _factors(rounds: Rounds, names: Sequence[str]) -> dict[str, list[float]]:
+def factors(rounds: Rounds, names: Sequence[str]) -> dict[str, list[float]]:
+    """Real-time factor of every round, by run."""
     return {name: [float(each["real_time_factor"]) for each in rounds[name]] for name in names}
 
 
