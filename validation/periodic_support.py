@@ -50,15 +50,22 @@ SOURCE = "endless Timoshenko rail on discrete springs, Floquet transform"
 
 
 class _Loaded(Stepper):
-    """The engine's step with a constant force on the left rail in the middle of the window."""
+    """The engine's step with a load in the middle of the left rail, added to what its forces have left in F."""
 
-    weight = 0.0
+    def __init__(self, model: Model, state: State, chunk: Chunk) -> None:
+        super().__init__(model, state, chunk)
+        given = model.given
+        self.weight = 0.0
+        self._shape = model.window.shape(np.array([given.length / 2.0]))[0]
+        stages = []
+        for name, stage in self.stages:
+            stages.append((name, stage))
+            if name == "forces and contact":
+                stages.append(("load", self._load_rail))
+        self.stages = tuple(stages)
 
-    def _solve(self) -> None:
-        given = self.model.given
-        shape = self.model.window.shape(np.array([given.length / 2.0]))[0]
-        self.state.view(at.F, "vertical")[0, 0, : given.modes] += self.weight * shape
-        super()._solve()
+    def _load_rail(self) -> None:
+        self.state.view(at.F, "vertical")[0, 0, : len(self._shape)] += self.weight * self._shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,10 +129,10 @@ def history(speed: int, length: float, modes: int, dt: float = 1e-4) -> History:
             stepper.weight = LOAD * (0.5 - 0.5 * np.cos(np.pi * min(1.0, X[i] / RAMP)))
             stepper.step(i)
             if i >= steps - last:
-                ahead = length / 2.0 - chunk.clock[i, at.FIRST_SEAT_S] - d * np.arange(state.seat_force.shape[2])
+                ahead = length / 2.0 - chunk.clock[i, at.FIRST_SEAT_S] - d * np.arange(state.seat_force.shape[3])
                 near = np.abs(ahead) < NEAR
                 x.append(ahead[near])
-                force.append(state.seat_force[0, 0, near])
+                force.append(state.seat_force[0, 0, 0, near])
                 w.append(shape @ state.view(at.U, "vertical")[0, 0, :modes])
     if state.force.any():
         raise RuntimeError("a wheel has touched the rail")

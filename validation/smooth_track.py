@@ -67,12 +67,10 @@ def _supported() -> tuple[float, float]:
     with threadpool_limits(1):
         for i in range(2 * count):
             stepper.step(i, i)
-            seats.append(state.seat_force[0, _F_VERTICAL].sum())
+            seats.append(state.seat_force[0, :, 0].sum())
     wheels = chunk.wheel[0, count:, ..., at.VERTICAL_FORCE].sum(axis=(1, 2))
     return float(np.mean(seats[count:])), float(wheels.mean())
 
-
-_F_VERTICAL = [0, 3]  # rows of seat_force: F_V, F_L, moment of the left rail, then of the right one
 
 CASES = (
     Case(
