@@ -11,17 +11,18 @@ LONGEST = 400  # lines; 300 is the aim
 
 LAYERS = [
     {"quantity", "presets", "backend", "launch", "channels", "overrides", "fields", "memory", "column", "machine",
-     "roofs", "profile_report", "profile_tables"},
+     "roofs", "profile_report", "profile_tables", "filters", "index", "profile_files", "profile_frame"},
     {"rail", "fastening", "slab", "mortar", "profile", "hertz", "kalker", "speed", "spectrum", "connector", "coach",
      "vehicle", "assembly", "train", "contact_search", "contact_geometry", "conicity", "realisation", "given_track",
-     "irregularity", "defects"},
+     "irregularity", "defects", "track_files"},
     {"parts", "ensemble", "scenario", "contact_cache"},
     {"integrator", "blocks", "model", "plan"},
     {"state", "scratch", "track_static"},
     {"stepper", "start", "setup"},
-    {"results", "writer", "recorder", "events", "stability", "prepare", "products", "stage_split", "timed_loop"},
+    {"ride", "en14363", "gb5599", "comfort", "metrics", "metrics_table", "results", "writer",
+     "recorder", "events", "stability", "prepare", "products", "stage_split", "timed_loop"},
     {"march", "worker", "gather"},
-    {"simulate", "profiling"},
+    {"simulate", "profiling", "contact_report"},
     {"cli"},
 ]  # fmt: skip
 """A module imports from its own layer and those above it in this list."""

@@ -1,4 +1,4 @@
-"""Command line: ``tiengine run``, ``tiengine profile``, ``tiengine list``, ``tiengine info``.
+"""Command line: ``tiengine run``, ``profile``, ``contact``, ``metrics``, ``list``, ``info``.
 
 Bad input ends with one line on stderr and exit status 2, a run that fails on its way with status 1. Taichi is imported
 only by ``run`` and ``profile``, so that the others answer at once.
@@ -152,6 +152,54 @@ def profile(
     profile_tables.show(profile_tables.report_tables(report))
 
 
+@main.command()
+@click.argument("wheel")
+@click.argument("rail")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Draw a figure, replacing a file.")
+@click.option("--json", "as_json", is_flag=True, help="Print all numbers as JSON.")
+@click.option("--cant", type=float, default=0.025, show_default=True, help="Inclination of the rail.")
+@click.option("--canted", is_flag=True, help="The rail's points are inclined already.")
+@click.option("--gauge", type=float, default=1.435, show_default=True, help="[m]")
+@click.option("--gauge-depth", type=float, default=0.016, show_default=True, help="Below the rail's top [m].")
+@click.option("--half-spacing", type=float, default=0.7465, show_default=True, help="Of the tape circles [m].")
+@click.option("--wheel-radius", type=float, default=0.43, show_default=True, help="At the tape circle [m].")
+@click.option("--tape-circle", type=float, default=0.0, help="Outward from the wheel file's y = 0 [m].")
+@click.option("--mirror-rail/--no-mirror-rail", default=None, help="The rail's gauge face is at positive y, or not.")
+@click.option("--smoothing", type=click.FloatRange(0.0, 5e-3), help="Of points; 0.0005 for measured profiles [m].")
+@click.option("--largest", type=float, default=0.008, show_default=True, help="Largest shift [m].")
+def contact(
+    wheel: str,
+    rail: str,
+    output: Path | None,
+    as_json: bool,
+    canted: bool,
+    tape_circle: float,
+    mirror_rail: bool | None,
+    smoothing: float | None,
+    largest: float,
+    **placement: float,
+) -> None:
+    """Show how WHEEL and RAIL, presets or files, touch: rolling radii, conicity, points of contact."""
+    from tiengine.contact_geometry import ContactSettings
+    from tiengine.contact_report import contact_report, draw
+    from tiengine.profile import ROUNDING_LENGTH, load_profile
+    from tiengine.quantity import build
+
+    length = ROUNDING_LENGTH if smoothing is None else smoothing
+    report = contact_report(
+        load_profile(wheel, "wheel", smoothing=length, tape_circle=tape_circle),
+        load_profile(rail, "rail", smoothing=length, has_cant=canted, mirror=mirror_rail),
+        build(ContactSettings, placement, "contact"),
+        largest,
+    )
+    if output is not None:
+        draw(report, output)
+    if as_json:
+        click.echo(report.to_json())
+        return
+    _print_rows([("wheel, rail", f"{wheel}, {rail}"), *report.rows()])
+
+
 @main.command("list")
 @click.argument("kind", type=click.Choice(KINDS), required=False)
 def list_presets(kind: str | None) -> None:
@@ -180,6 +228,24 @@ def info(file: Path) -> None:
             path = f"trains/{train:03d}"
             rows += [(f"{path}/{group}", content) for group, content in _groups(result[path])]
     _print_rows(rows)
+
+
+@main.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--train", type=click.IntRange(0), help="One train of an ensemble; default: all, summarised.")
+@click.option("--json", "output", type=click.Path(path_type=Path), help="Write all indices here too, replacing a file.")
+def metrics(file: Path, train: int | None, output: Path | None) -> None:
+    """Indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 for a result FILE, beside their limits."""
+    from tiengine import metrics_table, profile_tables, results
+    from tiengine.writer import check_output
+
+    if output is not None:
+        check_output(output, force=True)
+    with results.open(file) as result:
+        found = result.metrics(train)
+    if output is not None:
+        output.write_text(found.to_json() + "\n", encoding="utf-8")
+    profile_tables.show(metrics_table.metrics_table(found))
 
 
 def _text(value: Any) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 from platformdirs import user_cache_path
 
-from tiengine import contact_geometry, contact_search, hertz, kalker, profile
+from tiengine import contact_geometry, contact_search, hertz, kalker, profile, profile_frame
 from tiengine.contact_geometry import ContactSettings, ContactTable, build_contact_table
 from tiengine.profile import Profile
 
@@ -26,7 +26,7 @@ __all__ = ["contact_table"]
 
 FOLDER = "TIENGINE_CACHE"
 """Environment variable that names another folder."""
-MODULES: tuple[ModuleType, ...] = (contact_geometry, contact_search, hertz, kalker, profile)
+MODULES: tuple[ModuleType, ...] = (contact_geometry, contact_search, hertz, kalker, profile, profile_frame)
 FIELDS = ("u_min", "du", "alpha_min", "dalpha", "crown_offset")
 
 

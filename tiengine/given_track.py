@@ -1,26 +1,21 @@
-"""Tracks that are given: a measured series from a CSV file, or a user's function of chainage."""
+"""Tracks that are given: a measured series (:mod:`tiengine.track_files`), or a user's function of chainage."""
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from tiengine.presets import nearest
 from tiengine.quantity import InputError
 from tiengine.realisation import BlockSpline, sampled_spline
 
 __all__ = [
-    "COLUMNS",
     "FunctionTrack",
     "MeasuredTrack",
     "UserFunction",
     "function_spline",
-    "read_series",
     "smooth_step",
 ]
 
@@ -28,77 +23,8 @@ Reals = NDArray[np.float64]
 UserFunction = Callable[[Reals], tuple[Reals | float, Reals | float, Reals | float, Reals | float]]
 """Chainages (n,) to z_v, y_a, theta, gauge [m, m, rad, m], each (n,) or a number."""
 
-COLUMNS = ("x", "z_v", "y_a", "theta", "gauge")
-"""Columns a file may have: chainage [m], vertical [m], alignment [m], cross level [rad], gauge [m]."""
-
-
-def read_series(path: str | Path) -> Reals:
-    """Read a measured series.
-
-    The first line that is neither blank nor a comment (``#``) names the columns, in any order; ``x`` is
-    required, a channel that is absent is zero. Chainage increases strictly.
-
-    Args:
-        path: CSV file.
-
-    Returns:
-        Chainage, vertical, alignment, cross level, gauge [m, m, m, rad, m], shape (n, 5), n >= 4.
-
-    Raises:
-        InputError: The file breaks a rule; the message names file, line and rule.
-    """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"irregularity.file = {str(path)!r}: cannot be read ({error.strerror or error})") from None
-    except UnicodeDecodeError:
-        raise InputError(f"irregularity.file = {str(path)!r}: not a UTF-8 text file") from None
-    lines = [
-        (number, [cell.strip() for cell in next(csv.reader([line]))])
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not lines:
-        raise InputError(f"{path}, line 1: must name the columns {', '.join(COLUMNS)}")
-    header = _header(path, *lines[0])
-    if len(lines) < 5:
-        raise InputError(f"{path}, line {lines[-1][0]}: {len(lines) - 1} points; a spline needs at least 4")
-    rows = np.array([_row(path, number, cells, header) for number, cells in lines[1:]])
-    series = np.zeros((len(rows), len(COLUMNS)))
-    series[:, [COLUMNS.index(name) for name in header]] = rows
-    back = np.flatnonzero(np.diff(series[:, 0]) <= 0.0)
-    if back.size:
-        number = lines[int(back[0]) + 2][0]
-        raise InputError(f"{path}, line {number}: x = {series[back[0] + 1, 0]:g}: must be > the x before it")
-    return series
-
-
-def _header(path: str | Path, number: int, names: list[str]) -> list[str]:
-    """The names of the columns, checked."""
-    for name in names:
-        if name not in COLUMNS:
-            raise InputError(f"{path}, line {number}: column {name!r}: unknown{nearest(name, COLUMNS)}")
-    if len(set(names)) < len(names):
-        raise InputError(f"{path}, line {number}: a column is named twice")
-    if "x" not in names or len(names) < 2:
-        raise InputError(f"{path}, line {number}: needs column 'x' and one of {', '.join(COLUMNS[1:])}")
-    return names
-
-
-def _row(path: str | Path, number: int, cells: list[str], header: list[str]) -> list[float]:
-    """The numbers of a line, checked."""
-    if len(cells) != len(header):
-        raise InputError(f"{path}, line {number}: {len(cells)} values; the header names {len(header)} columns")
-    values = []
-    for name, cell in zip(header, cells, strict=True):
-        try:
-            value = float(cell)
-        except ValueError:
-            value = np.nan
-        if not np.isfinite(value):
-            raise InputError(f"{path}, line {number}: {name} = {cell!r}: must be a finite number")
-        values.append(value)
-    return values
+CHANNELS = 4
+"""Vertical, alignment, cross level, gauge."""
 
 
 class MeasuredTrack:
@@ -108,7 +34,7 @@ class MeasuredTrack:
         """Join the points.
 
         Args:
-            series: Chainage and four channels as :func:`read_series` returns them, shape (n, 5).
+            series: Chainage and four channels as ``read_series`` returns them, shape (n, 5).
             taper: Length of the fade at either end [m]; at most half the series is used for each.
         """
         x = series[:, 0]
@@ -148,12 +74,12 @@ class FunctionTrack:
 
 def function_spline(f: UserFunction, spacing: float) -> BlockSpline:
     """The C2 spline through a user's function at all multiples of ``spacing`` [m]."""
-    return sampled_spline(_columns(f, "function"), spacing, len(COLUMNS) - 1)
+    return sampled_spline(_columns(f, "function"), spacing, CHANNELS)
 
 
 def _columns(f: UserFunction, name: str) -> Callable[[Reals], Reals]:
     """The function with its four results checked and stacked, (n,) to (n, 4)."""
-    wanted = len(COLUMNS) - 1
+    wanted = CHANNELS
 
     def stacked(x: Reals) -> Reals:
         results = f(x)

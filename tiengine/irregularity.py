@@ -7,7 +7,7 @@ z = z_v + sigma b_i theta and y = y_a + sigma g/2, b_i = 0.75 m.
 
 from __future__ import annotations
 
-from typing import Annotated, Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from tiengine.given_track import (
     MeasuredTrack,
     UserFunction,
     function_spline,
-    read_series,
     smooth_step,
 )
 from tiengine.presets import nearest
@@ -32,6 +31,7 @@ from tiengine.spectrum import (
     load_spectrum,
     spectrum_names,
 )
+from tiengine.track_files import band_passed, read_series
 
 __all__ = [
     "HALF_BASE",
@@ -58,6 +58,9 @@ _MOST_BANDWIDTH = 1e4  # longest over shortest wave; a block then takes 40 MB
 class IrregularityParams(Params):
     """Which irregularity a track has; a ``file`` takes the place of the ``spectrum``.
 
+    A file's columns and the keys ``file_...`` are explained in :mod:`tiengine.track_files`; ``file_band_pass`` keeps
+    the waves from ``wavelength_min`` to ``wavelength_max`` only.
+
     ``short_wave`` adds the ISO 3095 limit to the vertical of each rail, from its longest band (0.45 m) or
     ``wavelength_min``, whichever is shorter, down to ``short_wave_min``.
     """
@@ -75,6 +78,11 @@ class IrregularityParams(Params):
     short_wave_min: Annotated[float, Q("m", "shortest wave of the rail roughness", gt=0, validate_default=True)] = 0.08
     taper: Annotated[float, Q("m", "length over which the irregularity begins", gt=0)] = 30.0
     file: str | None = None
+    file_unit: Literal["m", "mm"] = "m"
+    file_start: Annotated[float | None, Q("m", "mileage of the file at chainage zero")] = None
+    file_reverse: bool = False
+    file_vertical_up: bool = False
+    file_band_pass: bool = False
 
     @field_validator("spectrum")
     @classmethod
@@ -227,11 +235,14 @@ def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregul
     parts: list[_Track] = []
     shortest = params.shortest_wavelength
     if params.file is not None:
-        series = read_series(params.file)
-        series[:, 1:] *= params.scale
-        measured = MeasuredTrack(series, params.taper)
+        measured = MeasuredTrack(_measured_series(params, params.file), params.taper)
+        if measured.end <= taper_start:
+            raise InputError(
+                f"irregularity.file = {params.file!r}: ends at chainage {measured.end:g} m, before the train's way"
+                " begins; set file_start to the mileage of chainage zero"
+            )
         parts.append(measured)
-        shortest = min(shortest, measured.shortest)
+        shortest = min(shortest, max(measured.shortest, params.wavelength_min if params.file_band_pass else 0.0))
     elif params.spectrum != "none":
         band = (params.wavelength_min, params.wavelength_max)
         parts.append(noise_spline(params.seed, range(4), _track_densities(params), band))
@@ -245,6 +256,20 @@ def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregul
         rails = noise_spline(params.seed, (4, 5), (felt, felt), band, shortest_block=_ROUGHNESS_BLOCK)
         parts.append(_Roughness(rails))
     return Irregularity(parts, taper_start, params.taper, shortest)
+
+
+def _measured_series(params: IrregularityParams, file: str) -> Reals:
+    """Chainage and channels of a file as the train is to meet them, shape (n, 5)."""
+    series = read_series(
+        file,
+        unit=params.file_unit,
+        start=params.file_start,
+        reverse=params.file_reverse,
+        vertical_up=params.file_vertical_up,
+    )
+    if params.file_band_pass:
+        series = band_passed(series, params.wavelength_min, params.wavelength_max)
+    return np.column_stack([series[:, 0], params.scale * series[:, 1:]])
 
 
 def _track_densities(params: IrregularityParams) -> list[Density]:

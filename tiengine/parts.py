@@ -19,8 +19,10 @@ from pydantic import BeforeValidator, Field
 
 from tiengine.fastening import Fastening
 from tiengine.mortar import Mortar
-from tiengine.presets import KINDS, find_preset, load_toml, nearest, read_text
+from tiengine.presets import KINDS, find_preset, load_toml, nearest
 from tiengine.profile import ROUNDING_LENGTH, Profile
+from tiengine.profile_files import read_profile
+from tiengine.profile_frame import placed
 from tiengine.quantity import InputError, Params, Q, build
 from tiengine.rail import Rail
 from tiengine.slab import Slab
@@ -53,6 +55,8 @@ class ProfilePoints(Params):
     points: Annotated[str, Field(description="y and z in mm, a pair a line")]
     has_cant: bool = False
     smoothing: Annotated[float, Q("m", "length of the smoothing spline", ge=0, le=5e-3)] = ROUNDING_LENGTH
+    mirror: Annotated[bool | None, Field(description="a rail's gauge face is at positive y")] = None
+    tape_circle: Annotated[float, Q("m", "outward from the points' y = 0; of a wheel", ge=-0.2, le=0.2)] = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,8 +184,8 @@ def _read(where: str, kind: str, name: Any, folder: Path | None) -> dict[str, An
     path = find_preset(kind, name, folder=folder, called=where)
     if path.suffix == ".toml":
         return load_toml(path)
-    lines = (line.split("#")[0].strip() for line in read_text(path).splitlines())
-    return {"name": path.stem, "points": "\n".join(line for line in lines if line)}
+    found = read_profile(path, "wheel" if where == "train.wheel_profile" else "rail", f"{where} = {name!r}")
+    return {"name": path.stem, "points": "\n".join(f"{y:.12g} {z:.12g}" for y, z in found.points)}
 
 
 def _resolved(kind: str, part: str | dict[str, Any], presets: Presets) -> dict[str, Any]:
@@ -212,9 +216,18 @@ def _profile(table: dict[str, Any], where: str, kind: Literal["wheel", "rail"]) 
     given = build(ProfilePoints, table, where)
     rows = [line.replace(",", " ").replace(";", " ").split() for line in given.points.strip().splitlines()]
     try:
-        points = np.array([[float(y), float(z)] for y, z in rows]).reshape(-1, 2) * 1e-3
+        points = np.array([[float(y), float(z)] for y, z in rows]).reshape(-1, 2)
     except ValueError:
         raise InputError(f"{where}: every line of its points must hold two numbers, y and z in mm") from None
+    points = placed(
+        points,
+        kind,
+        where,
+        has_cant=given.has_cant,
+        smoothing=given.smoothing,
+        mirror=given.mirror,
+        tape_circle=given.tape_circle,
+    )
     return Profile(given.name, kind, points[:, 0].copy(), points[:, 1].copy(), given.has_cant, given.smoothing)
 
 

@@ -30,6 +30,7 @@ KINDS = ("vehicles", "rails", "slabs", "fastenings", "profiles", "irregularity",
 """Folders of the library."""
 
 _SUFFIXES = {"profiles": (".csv",)}  # every other kind is TOML
+_PATH_SUFFIXES = (".toml", ".csv", ".txt", ".dat", ".prw", ".prr", ".whl", ".ban")  # of files named in a scenario
 
 
 def library_folder(kind: str) -> Path:
@@ -92,7 +93,7 @@ def find_preset(kind: str, name_or_path: str, suffix: str = "", folder: Path | N
 
 def _is_path(text: str, suffix: str) -> bool:
     """Whether a text means a file rather than a preset (names hold neither slashes nor known suffixes)."""
-    return "/" in text or "\\" in text or Path(text).suffix.lower() in {suffix, ".toml", ".csv", ".txt", ".dat"}
+    return "/" in text or "\\" in text or Path(text).suffix.lower() in {suffix, *_PATH_SUFFIXES}
 
 
 def nearest(name: str, known: list[str] | tuple[str, ...]) -> str:

@@ -19,21 +19,20 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline, make_smoothing_spline
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
+from tiengine.profile_files import read_profile
+from tiengine.profile_frame import FEWEST_POINTS, Kind, increasing_run, placed, smoothing_curve
 from tiengine.quantity import InputError
 
 __all__ = ["Kind", "Profile", "load_profile", "profile_names"]
 
 Reals = NDArray[np.float64]
-Kind = Literal["wheel", "rail"]
 
-FEWEST_POINTS = 10
 ROUNDING_LENGTH = 5e-5
 """Default smoothing length l [m]: leaves 1 % of curvature noise on CHN60_analytic's 0.05 mm list."""
 
@@ -80,13 +79,7 @@ class Profile:
     @cached_property
     def path(self) -> CubicSpline:
         """The smoothed curve (y, z) over the chord length t [m]."""
-        t = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(self.y), np.diff(self.z)))])
-        points = np.stack([self.y, self.z], axis=1)
-        if self.smoothing > 0.0:
-            scaled = t / self.smoothing
-            for column in points.T:
-                column[:] = make_smoothing_spline(scaled, column, np.gradient(scaled), lam=1.0)(scaled)
-        return CubicSpline(t, points, bc_type="natural")
+        return smoothing_curve(np.stack([self.y, self.z], axis=1), self.smoothing)
 
     @cached_property
     def height(self) -> CubicSpline:
@@ -147,7 +140,7 @@ class Profile:
         angle = np.arctan(cant)
         y = self.y * np.cos(angle) + self.z * np.sin(angle)
         z = self.z * np.cos(angle) - self.y * np.sin(angle)
-        first, last = _increasing_run(y, int(np.argmin(z)))
+        first, last = increasing_run(y, int(np.argmin(z)))
         return replace(self, y=y[first:last], z=z[first:last], has_cant=True)
 
     def _crown(self, cant: float) -> float:
@@ -179,13 +172,6 @@ class Profile:
         return float(brentq(lambda y: float(head(y)) - level, head.x[0], head.x[top], xtol=1e-12))
 
 
-def _increasing_run(y: Reals, inside: int) -> tuple[int, int]:
-    """The slice [first, last) around index ``inside`` over which y increases by more than rounding."""
-    falls = np.flatnonzero(np.diff(y) <= 1e-9)
-    before, after = falls[falls < inside], falls[falls >= inside]
-    return (int(before[-1]) + 1 if before.size else 0), (int(after[0]) + 1 if after.size else y.size)
-
-
 def profile_names() -> list[str]:
     """Names of the profiles of the library."""
     folder = resources.files("tiengine.library") / "profiles"
@@ -193,52 +179,48 @@ def profile_names() -> list[str]:
 
 
 def load_profile(
-    name_or_path: str | Path, kind: Kind, *, has_cant: bool = False, smoothing: float = ROUNDING_LENGTH
+    name_or_path: str | Path,
+    kind: Kind,
+    *,
+    has_cant: bool = False,
+    smoothing: float = ROUNDING_LENGTH,
+    mirror: bool | None = None,
+    tape_circle: float = 0.0,
 ) -> Profile:
-    """A profile of the library, or one read from a file.
-
-    A file has two columns, y and z in millimetres in the frame of this module, separated by a comma,
-    semicolon or blanks; ``#`` starts a comment.
+    """A profile of the library, or one read from a file (formats: :mod:`tiengine.profile_files`).
 
     Args:
         name_or_path: Name of a preset (``"LMA"``, ``"S1002"``, ``"CHN60"``, ``"60E1"``) or path of a file.
         kind: ``"wheel"`` or ``"rail"``.
         has_cant: The points are those of an inclined rail.
         smoothing: Length of the smoothing spline [m].
+        mirror: A rail's gauge face is at the file's positive y; None if nothing is known.
+        tape_circle: Distance of a wheel's tape circle outward from the file's y = 0 [m].
 
     Returns:
         The profile in metres.
 
     Raises:
-        InputError: No such preset or file, columns that are not two numbers, or points :class:`Profile`
-            refuses.
+        InputError: No such preset or file, one that breaks a rule of its format, a surface with kinks, or points
+            :class:`Profile` refuses.
     """
     name = str(name_or_path)
-    preset = resources.files("tiengine.library") / "profiles" / f"{name}.csv"
     if name in profile_names():
-        text = preset.read_text(encoding="utf-8")
+        path = Path(str(resources.files("tiengine.library") / "profiles" / f"{name}.csv"))
     elif Path(name).is_file():
-        text = Path(name).read_text(encoding="utf-8", errors="replace")
+        path = Path(name)
     else:
         close = difflib.get_close_matches(name, profile_names(), n=1, cutoff=0.3)
         hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(profile_names())}"
         raise InputError(f"{kind} profile {name!r}: neither a file nor a preset; {hint}")
-    points = _read_points(text, f"{kind} profile {name!r}") * 1e-3
+    found = read_profile(path, kind, f"{kind} profile {name!r}")
+    points = placed(
+        found.points,
+        kind,
+        found.where,
+        has_cant=has_cant,
+        smoothing=smoothing,
+        mirror=mirror,
+        tape_circle=tape_circle,
+    )
     return Profile(name, kind, points[:, 0].copy(), points[:, 1].copy(), has_cant, smoothing)
-
-
-def _read_points(text: str, where: str) -> Reals:
-    """The two columns of a profile file, shape (n, 2)."""
-    rows: list[ArrayLike] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        fields = line.split("#")[0].replace(",", " ").replace(";", " ").split()
-        if not fields:
-            continue
-        try:
-            y, z = (float(field) for field in fields)
-        except ValueError:
-            raise InputError(
-                f"{where}: line {number} is {line.strip()!r}; two numbers, y and z in mm, expected"
-            ) from None
-        rows.append((y, z))
-    return np.array(rows, dtype=np.float64).reshape(-1, 2)

@@ -19,6 +19,7 @@ from tiengine.presets import nearest
 from tiengine.quantity import InputError
 
 if TYPE_CHECKING:
+    from tiengine.metrics import Metrics
     from tiengine.scenario import Scenario
 
 __all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "Result", "open"]
@@ -153,6 +154,19 @@ class Result:
     def irregularity(self, train: int = 0) -> dict[str, NDArray[Any]]:
         """Irregularity as felt at every wheel; channels have shape (time, wheelset, side)."""
         return self.group("irregularity", train)
+
+    def metrics(self, train: int | None = None) -> Metrics:
+        """Indices of the standards (docs/indices.md).
+
+        Args:
+            train: Index of one train; all if None.
+
+        Raises:
+            InputError: No such train, or the file lacks what the indices need.
+        """
+        from tiengine.metrics import evaluate  # filters and vehicles: not for those who only read
+
+        return evaluate(self, train)
 
     def close(self) -> None:
         """Close the file; arrays taken from it stay."""

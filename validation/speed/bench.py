@@ -1,4 +1,4 @@
-"""A stepper that is given way after way to run, and timed."""
+"""A stepper that is given way after way to run, and timed; callers keep BLAS on one thread, as runs do."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from tiengine.irregularity import Irregularity, make_irregularity
 from tiengine.model import Ingredients, build_model
@@ -102,6 +101,5 @@ class Bench:
 
 def timed_in_turn(benches: Sequence[Bench], rounds: int, steps: int) -> list[float]:
     """Wall time of a step of each [us], medians over rounds in which all take a block in turn."""
-    with threadpool_limits(1):
-        spent = [[bench.block_us(steps) for bench in benches] for _ in range(rounds)]
+    spent = [[bench.block_us(steps) for bench in benches] for _ in range(rounds)]
     return [float(x) for x in np.median(spent, axis=0)]

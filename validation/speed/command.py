@@ -1,4 +1,4 @@
-"""The whole command ``tiengine run paper`` as its user waits for it: Taichi's cache warm, and empty."""
+"""The whole command ``tiengine run paper`` as its user waits for it: caches warm, and empty."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from tiengine import results
+from tiengine import contact_cache, results
 from validation.speed.effort import Effort
 from validation.speed.findings import Findings
 from validation.speed.runs import CASES, Facts, median_of
@@ -41,7 +41,7 @@ def once(folder: Path, cache: Path, *settings: str) -> Facts:
 
     Args:
         folder: For the result.
-        cache: Folder of Taichi's cache.
+        cache: Folder of both caches, Taichi's and that of contact tables.
         settings: Further ``KEY=VALUE``.
 
     Returns:
@@ -51,7 +51,7 @@ def once(folder: Path, cache: Path, *settings: str) -> Facts:
     common = (f"{key}={_toml(value)}" for key, value in CASES["common"].items())
     chosen = [word for each in (*common, *settings) for word in ("--set", each)]
     words = [sys.executable, "-c", ENTRY, "run", "paper", "--quiet", "--force", "-o", str(path), *chosen]
-    environment = os.environ | {CACHE: str(cache)}
+    environment = os.environ | {CACHE: str(cache), contact_cache.FOLDER: str(cache / "contact")}
     clock = time.perf_counter()
     subprocess.run(words, check=True, env=environment)
     wall = time.perf_counter() - clock

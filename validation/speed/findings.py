@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import subprocess
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -29,6 +30,7 @@ class Circumstances:
     Attributes:
         date: Local time.
         effort: Its name.
+        commit: Of the source, "+" if files differ from it.
         load_average: Of the last minute, at the start.
         others_cores: Cores that other processes used at the start.
         machine: The computer.
@@ -37,6 +39,7 @@ class Circumstances:
 
     date: str
     effort: str
+    commit: str
     load_average: float
     others_cores: float
     machine: dict[str, Any]
@@ -92,7 +95,16 @@ def circumstances(effort: str, date: str) -> Circumstances:
     """Look around, for a second."""
     cores = os.cpu_count() or 1
     others = psutil.cpu_percent(interval=1.0) / 100.0 * cores
-    return Circumstances(date, effort, psutil.getloadavg()[0], others, asdict(this_machine()), versions())
+    return Circumstances(date, effort, _commit(), psutil.getloadavg()[0], others, asdict(this_machine()), versions())
+
+
+def _commit() -> str:
+    """State of the source."""
+    words = ("git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty=+", "--exclude=*")
+    try:
+        return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
 
 
 def read(path: Path) -> dict[str, Any]:

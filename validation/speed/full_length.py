@@ -54,7 +54,7 @@ def full_length(effort: Effort, rounds: Mapping[str, Sequence[Facts]]) -> Findin
             "dofs": float(rounds["full_20"][0]["dofs"]),
             "dofs_over_window": rounds["full_20"][0]["dofs"] / rounds["paper"][0]["dofs"],
         },
-        {"profiles": profiles, "rtf_rounds": factors(rounds, ("full_20", "full_90"))},
+        {"profiles": profiles, "rounds": factors(rounds, ("full_20", "full_90"))},
     )
 
 

@@ -82,9 +82,9 @@ def _circumstances(cases: Mapping[str, Any]) -> Iterator[str]:
         yield f"{machine}"
     yield ""
     yield from _table(
-        ("case", "measured", "effort", "load average at the start", "cores used by others then"),
+        ("case", "measured", "effort", "commit", "load average at the start", "cores used by others then"),
         [
-            (name.replace("_", " "), each["date"], each["effort"], f"{each['load_average']:.2f}",
+            (name.replace("_", " "), each["date"], each["effort"], each["commit"], f"{each['load_average']:.2f}",
              f"{each['others_cores']:.2f}")
             for name, each in seen.items()
         ],
@@ -102,11 +102,12 @@ def _rounds(cases: Mapping[str, Any]) -> list[str]:
     """Spread of the rounds of every run."""
     body = []
     for found in cases.values():
-        for run, factors in found["data"].get("rtf_rounds", {}).items():
-            ordered = sorted(factors)
+        for run, rounds in found["data"].get("rounds", {}).items():
+            ordered = sorted(rounds["rtf"])
             numbers = (ordered[0], median(ordered), ordered[-1])
-            body.append((RUNS[run].words, str(len(ordered)), *(f"{x:.3f}" for x in numbers)))
-    return _table(("run", "rounds", "least", "median", "largest"), body)
+            others = ", ".join(f"{x:.1f}" for x in rounds["others_cores"])
+            body.append((RUNS[run].words, str(len(ordered)), *(f"{x:.3f}" for x in numbers), others))
+    return _table(("run", "rounds", "least", "median", "largest", "cores that others used in each round"), body)
 
 
 def _scaling(data: Mapping[str, Any]) -> list[str]:
@@ -121,10 +122,13 @@ def _scaling(data: Mapping[str, Any]) -> list[str]:
         for axis in data.values()
         if "shares_last" in axis
     ]
-    for kind, words in (("interval", "steps between samples of everything"), ("channels", "channels of a wheel")):
+    for kind, words, limit in (
+        ("interval", "steps between samples of everything", "recording of bodies and pressures, writing"),
+        ("channels", "channels of a wheel", "writing; a channel costs less than the noise"),
+    ):
         axis = data["outputs"][kind]
         values = ", ".join(f"{x:g}: {us:.0f}" for x, us in zip(axis["x"], axis["us"], strict=True))
-        body.append((words, values, f"{axis['exponent']:.2f}", "", "writing and recording"))
+        body.append((words, values, f"{axis['exponent']:.2f}", "", limit))
     return _table(("against", "us a step (trains: a train-step)", "exponent", "upper half", "largest stages"), body)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import time
 import tomllib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -17,6 +18,8 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
+
+import psutil
 
 __all__ = ["CASES", "RUNS", "Facts", "Run", "apart", "in_turn", "median_of", "perform", "settings_of"]
 
@@ -53,7 +56,8 @@ RUNS = {name: Run(**table) for name, table in CASES["runs"].items()}
 
 def settings_of(run: Run, distance: float) -> dict[str, Any]:
     """Keys to change for a way of so many metres."""
-    return CASES["common"] | run.settings | {"train.distance": distance}
+    common: dict[str, Any] = CASES["common"]
+    return common | run.settings | {"train.distance": distance}
 
 
 def perform(run: Run, distance: float) -> Facts:
@@ -96,6 +100,9 @@ def in_turn(
         rounds: How often each.
         distance: Way [m].
         tell: Called with words on what comes next.
+
+    Returns:
+        For each run its rounds, with ``others_cores``, the cores that other processes used meanwhile.
     """
     facts: dict[str, list[Facts]] = {name: [] for name in names}
     with ExitStack() as stack:
@@ -107,7 +114,10 @@ def in_turn(
         for i in range(rounds):
             for name, process in processes.items():
                 tell(f"{RUNS[name].words}, round {i + 1} of {rounds}")
-                facts[name].append(process.submit(perform, RUNS[name], distance).result())
+                before = _cpu_seconds()
+                found = process.submit(perform, RUNS[name], distance).result()
+                wall, own, everyone = (now - then for now, then in zip(_cpu_seconds(), before, strict=True))
+                facts[name].append(found | {"others_cores": max(everyone - own, 0.0) / wall})
     return facts
 
 
@@ -120,6 +130,14 @@ def apart(call: Callable[..., T], *calls: Sequence[Any]) -> list[T]:
 def median_of(facts: Sequence[Facts], key: str) -> float:
     """Median over repeated runs."""
     return float(median(float(each[key]) for each in facts))
+
+
+def _cpu_seconds() -> tuple[float, float, float]:
+    """Clock, processor time of this process and all below it, and of all processes [s]."""
+    me = psutil.Process()
+    own = sum(sum(each.cpu_times()[:4]) for each in (me, *me.children(recursive=True)))  # those that ended included
+    times = psutil.cpu_times()
+    return time.perf_counter(), own, times.user + times.nice + times.system
 
 
 def _process() -> ProcessPoolExecutor:

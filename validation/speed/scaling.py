@@ -71,7 +71,9 @@ def scaling(effort: Effort, tell: Callable[[str], object]) -> Findings:
 
 def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
     """Time of a step at every value of an axis [us], and what of it is largest at the last."""
-    from tiengine import backend  # here: the parent starts no Taichi
+    from threadpoolctl import threadpool_limits  # here: the parent starts no Taichi
+
+    from tiengine import backend
     from tiengine.scenario import load_scenario
     from tiengine.setup import ingredients
     from validation.speed.bench import Bench, timed_in_turn
@@ -80,8 +82,10 @@ def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
     axis = AXES[name]
     scenario = load_scenario("paper", settings_of(RUNS["paper"], WAY))
     given = ingredients(scenario, float(scenario.numerics.time_step))
-    benches = [Bench.of(scenario, replace(given, **axis.change(x)), steps) for x in axis.x]
-    us = timed_in_turn(benches, rounds, steps)
+    with threadpool_limits(1):
+        benches = [Bench.of(scenario, replace(given, **axis.change(x)), steps) for x in axis.x]
+        us = timed_in_turn(benches, rounds, steps)
+        first, last = (bench.shares(steps) for bench in (benches[0], benches[-1]))
     if axis.unit == "train-step":
         us = [each / x for each, x in zip(us, axis.x, strict=True)]
     return {
@@ -91,8 +95,8 @@ def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
         "us": us,
         "exponent": exponent(axis.x, us),
         "exponent_upper": exponent(*_upper(axis.x, us)),
-        "shares_first": benches[0].shares(steps),
-        "shares_last": benches[-1].shares(steps),
+        "shares_first": first,
+        "shares_last": last,
     }
 
 

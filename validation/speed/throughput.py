@@ -30,7 +30,7 @@ def one_train(rounds: Rounds) -> Findings:
             "dofs_default": float(default[0]["dofs"]),
             "peak_memory_mb": median_of(paper, "peak_memory"),
         },
-        {"rtf_rounds": factors(rounds, ("paper", "default"))},
+        {"rounds": factors(rounds, ("paper", "default"))},
     )
 
 
@@ -50,13 +50,14 @@ def batch(rounds: Rounds) -> Findings:
             "peak_memory_mb": median_of(rounds["batch"], "peak_memory"),
             "peak_memory_one_worker_mb": median_of(rounds["batch_one_worker"], "peak_memory"),
         },
-        {"rtf_rounds": factors(rounds, _BATCHES)},
+        {"rounds": factors(rounds, _BATCHES)},
     )
 
 
-def factors(rounds: Rounds, names: Sequence[str]) -> dict[str, list[float]]:
-    """Real-time factor of every round, by run."""
-    return {name: [float(each["real_time_factor"]) for each in rounds[name]] for name in names}
+def factors(rounds: Rounds, names: Sequence[str]) -> dict[str, dict[str, list[float]]]:
+    """Real-time factor of every round, and what other processes took of the cores meanwhile, by run."""
+    keys = {"rtf": "real_time_factor", "others_cores": "others_cores"}
+    return {name: {key: [float(each[fact]) for each in rounds[name]] for key, fact in keys.items()} for name in names}
 
 
 _BATCHES = ("batch", "batch_one_worker", "batch_threads")

@@ -1,0 +1,214 @@
+"""What ``tiengine contact`` shows of a wheel on a rail: rolling-radius difference, conicity, points of contact.
+
+The wheelset is shifted sideways on straight track, its roll follows (:mod:`tiengine.conicity`). Conicity is that of
+harmonic linearisation; what EN 15302 gets by integrating the motion is compared in ``docs/files.md``.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.conicity import equivalent_conicity, wheelset_position
+from tiengine.contact_geometry import ContactSettings, WheelRailPair
+from tiengine.profile import Profile
+from tiengine.quantity import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["ContactReport", "contact_report", "draw"]
+
+Reals = NDArray[np.float64]
+
+REFERENCE_AMPLITUDE = 3e-3
+"""Amplitude at which conicities are compared [m], EN 15302."""
+SHIFT_STEP = 0.05e-3
+ORANGE, GREEN, BLUE, VERMILION = "#E69F00", "#009E73", "#0072B2", "#D55E00"
+"""Colours of Okabe and Ito, which the colour-blind tell apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactReport:
+    """Contact of a wheelset over its shift to the right.
+
+    Attributes:
+        pair: Wheel and rail.
+        shift: Shifts y [m], shape (n,), from the largest to the left to the largest to the right.
+        radius_difference: Right less left rolling radius [m], shape (n,).
+        roll: Roll, right-handed about x forward [rad], shape (n,).
+        wheel_station: Contact on the right wheel, outward from the tape circle [m], shape (n,).
+        rail_station: Contact on the right rail, outward from its crown [m], shape (n,).
+        contact_angle: Inclination of the right contact, positive where the rail falls inward [rad], shape (n,).
+        amplitude: Amplitudes A [m], shape (k,).
+        conicity: Equivalent conicity at A, shape (k,).
+    """
+
+    pair: WheelRailPair
+    shift: Reals
+    radius_difference: Reals
+    roll: Reals
+    wheel_station: Reals
+    rail_station: Reals
+    contact_angle: Reals
+    amplitude: Reals
+    conicity: Reals
+
+    @property
+    def reference_conicity(self) -> float:
+        """Equivalent conicity at 3 mm."""
+        return float(self.conicity[np.argmin(np.abs(self.amplitude - REFERENCE_AMPLITUDE))])
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Words and values of the table on screen."""
+        rows = [("equivalent conicity at 3 mm", f"{self.reference_conicity:.4f}")]
+        for A, conicity in zip(self.amplitude[1::2], self.conicity[1::2], strict=False):
+            difference = float(np.interp(A, self.shift, self.radius_difference))
+            words = f"rolling-radius difference {difference * 1e3:.3f} mm, conicity {conicity:.4f}"
+            rows.append((f"{A * 1e3:g} mm", words))
+        return rows
+
+    def to_json(self) -> str:
+        """All numbers, in SI, as JSON."""
+        placement = {"gauge", "gauge_depth", "cant", "half_spacing", "wheel_radius"}
+        settings = self.pair.settings.model_dump(include=placement)
+        content: dict[str, Any] = {
+            "wheel": self.pair.wheel.name,
+            "rail": self.pair.rail.name,
+            "settings": settings,
+            "units": {"length": "m", "angle": "rad", "conicity": "-"},
+            "conicity_at_3mm": self.reference_conicity,
+        }
+        names = ("shift", "radius_difference", "roll", "wheel_station", "rail_station", "contact_angle")
+        content |= {name: getattr(self, name).tolist() for name in (*names, "amplitude", "conicity")}
+        return json.dumps(content, indent=1)
+
+
+def contact_report(wheel: Profile, rail: Profile, settings: ContactSettings, largest: float = 8e-3) -> ContactReport:
+    """Compute contact geometry.
+
+    Args:
+        wheel: Wheel profile.
+        rail: Rail profile.
+        settings: Gauge, cant, tape circles' distance, radius.
+        largest: Largest shift and amplitude [m].
+
+    Raises:
+        InputError: ``largest`` is below 3 mm, or profiles that do not reach as far as the shift.
+    """
+    if not REFERENCE_AMPLITUDE <= largest <= 20e-3:
+        raise InputError(f"largest shift = {largest * 1e3:g} mm: must be 3 to 20 mm")
+    pair = WheelRailPair(wheel, rail, settings)
+    half = round(largest / SHIFT_STEP)
+    shift: Reals = SHIFT_STEP * np.arange(-half, half + 1, dtype=np.float64)
+    position = wheelset_position(pair, shift)
+    amplitude: Reals = 0.5e-3 * np.arange(1, int(largest / 0.5e-3 + 1e-9) + 1, dtype=np.float64)
+    return ContactReport(
+        pair=pair,
+        shift=shift,
+        radius_difference=position.right.dz_w - position.left.dz_w,
+        roll=position.roll,
+        wheel_station=position.right.s_w,
+        rail_station=position.right.s_r,
+        contact_angle=np.arctan(position.right.tan_gamma),
+        amplitude=amplitude,
+        conicity=equivalent_conicity(pair, amplitude),
+    )
+
+
+def draw(report: ContactReport, path: Path) -> None:
+    """Draw rolling-radius difference, conicity, and the profiles with lines between points in contact.
+
+    Args:
+        report: What to draw.
+        path: Figure; the suffix tells the format.
+
+    Raises:
+        InputError: A suffix that is no format of figures, or a file that cannot be written.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 8.4), layout="constrained")
+    known = FigureCanvasAgg(figure).get_supported_filetypes()
+    if path.suffix.lower().lstrip(".") not in known:
+        raise InputError(f"output = {str(path)!r}: its suffix must be one of {', '.join(sorted(known))}")
+    grid = figure.add_gridspec(3, 2, height_ratios=(1.0, 1.0, 1.5))
+    _draw_difference(figure.add_subplot(grid[0, 0]), report)
+    _draw_conicity(figure.add_subplot(grid[0, 1]), report)
+    _draw_stations(figure.add_subplot(grid[1, 0]), report)
+    _draw_angle(figure.add_subplot(grid[1, 1]), report)
+    _draw_profiles(figure.add_subplot(grid[2, :]), report)
+    settings = report.pair.settings
+    figure.suptitle(
+        f"{report.pair.wheel.name} on {report.pair.rail.name}, cant {_cant(settings.cant)}, gauge"
+        f" {settings.gauge * 1e3:g} mm, tape circles {2e3 * settings.half_spacing:g} mm apart,"
+        f" radius {settings.wheel_radius * 1e3:g} mm",
+        fontsize="medium",
+    )
+    try:
+        figure.savefig(path, dpi=150)
+    except OSError as error:
+        raise InputError(f"output = {str(path)!r}: cannot be written ({error.strerror or error})") from None
+
+
+def _cant(cant: float) -> str:
+    return f"1:{1.0 / cant:g}" if cant > 0.0 else "0"
+
+
+def _draw_difference(axes: Axes, report: ContactReport) -> None:
+    axes.plot(report.shift * 1e3, report.radius_difference * 1e3, color=BLUE)
+    axes.set(xlabel="shift y to the right [mm]", ylabel="rolling-radius difference [mm]")
+    axes.grid(alpha=0.3)
+
+
+def _draw_conicity(axes: Axes, report: ContactReport) -> None:
+    value = report.reference_conicity
+    axes.plot(report.amplitude * 1e3, report.conicity, color=BLUE, marker="o", markersize=3)
+    axes.plot(3.0, value, "s", color=VERMILION, label=f"{value:.4f} at 3 mm")
+    axes.set(xlabel="amplitude [mm]", ylabel="equivalent conicity [-]", xlim=(0.0, None), ylim=(0.0, None))
+    axes.grid(alpha=0.3)
+    axes.legend()
+
+
+def _draw_stations(axes: Axes, report: ContactReport) -> None:
+    axes.plot(report.shift * 1e3, report.wheel_station * 1e3, color=BLUE, label="wheel, from the tape circle")
+    axes.plot(report.shift * 1e3, report.rail_station * 1e3, color=ORANGE, ls="--", label="rail, from the crown")
+    axes.set(xlabel="shift y to the right [mm]", ylabel="contact, outward [mm]")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize="small")
+
+
+def _draw_angle(axes: Axes, report: ContactReport) -> None:
+    axes.plot(report.shift * 1e3, np.degrees(report.contact_angle), color=GREEN)
+    axes.set(xlabel="shift y to the right [mm]", ylabel="contact angle, right [deg]")
+    axes.grid(alpha=0.3)
+
+
+def _draw_profiles(axes: Axes, report: ContactReport) -> None:
+    """The right wheel in its place, lifted off the rail, at one scale; lines join what touches at each millimetre."""
+    pair, lift = report.pair, 14.0
+    offset = (pair.settings.half_spacing - pair.crown_offset) * 1e3
+    s, o = np.linspace(*pair.wheel.span, 600), np.linspace(*pair.canted_rail.span, 600)
+    axes.plot(offset + s * 1e3, pair.wheel.height(s) * 1e3 - lift, color=BLUE)
+    axes.plot(o * 1e3, pair.canted_rail.height(o) * 1e3, color=ORANGE)
+    labelled = np.inf
+    middle, every = report.shift.size // 2, round(1e-3 / SHIFT_STEP)
+    for i in range(middle % every, report.shift.size, every):
+        wheel, rail = report.wheel_station[i], report.rail_station[i]
+        ends = [offset + wheel * 1e3, rail * 1e3]
+        heights = [float(pair.wheel.height(wheel)) * 1e3 - lift, float(pair.canted_rail.height(rail)) * 1e3]
+        axes.plot(ends, heights, "o-", color=VERMILION, markersize=3, linewidth=0.8)
+        if abs(ends[0] - labelled) > 2.5 or i == middle:  # else the numbers overlap
+            labelled = ends[0]
+            label = f"{report.shift[i] * 1e3:.0f}"
+            axes.annotate(label, (ends[0], heights[0]), (0, 5), textcoords="offset points", ha="center", fontsize=7)
+    axes.set(xlabel="outward from the rail's crown [mm]", ylabel="down [mm]", aspect="equal")
+    axes.set_title("right wheel, drawn above its rail; contacts at shifts y [mm]", fontsize="small")
+    axes.invert_yaxis()
+    axes.grid(alpha=0.3)

@@ -1,0 +1,144 @@
+"""EN 14363, running behaviour of a vehicle on straight track (zone 1), normal method.
+
+Quantities: the quotient Y/Q and the wheelset's force sum Y, low pass of 20 Hz, means over 2 m every 0.5 m; the wheel
+force Q, low pass of 20 Hz; accelerations of floor points over the bogies, 0.4 to 10 Hz. Of each series the percentiles
+0.15 and 99.85 count, the greater in magnitude (of Q the upper).
+
+A zone has sections of 250 m, above 220 km/h 500 m, 25 at least and 10 km together. With these the estimated maximum
+is mean + k standard deviation of the sections' values, k = 3.0 for running safety and 2.2 else: an assessment of the
+zone. On less way the percentiles are those of the whole: an index.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.filters import band_pass, sliding_mean
+from tiengine.index import Index, worst
+from tiengine.ride import Ride
+
+__all__ = ["body_indices", "extreme", "shortfall", "wheel_force_limit", "wheel_indices"]
+
+Reals = NDArray[np.float64]
+
+STANDARD = "EN 14363:2016"
+SAFETY, OTHER = 3.0, 2.2  # k: running safety; track loading and ride characteristics
+QUOTIENT_LIMIT = 0.8
+ACCELERATION_LIMIT = 2.5  # m/s^2
+BAND = (0.4, 10.0)  # Hz
+FAST = 220.0 / 3.6  # m/s: above it sections are longer
+SECTIONS, ZONE = 25, 10e3  # number and m
+Q_SPEEDS = (160.0, 200.0, 250.0, 300.0)  # km/h
+Q_CAPS = (200.0, 190.0, 180.0, 170.0, 160.0)  # kN up to each speed, and above the last
+
+
+def section_length(speed: float) -> float:
+    """Length of a section [m] at a speed [m/s]."""
+    return 500.0 if speed > FAST + 1e-9 else 250.0
+
+
+def shortfall(way: float, speed: float) -> str:
+    """What a way [m] at a speed [m/s] lacks of a zone, in words; empty if nothing."""
+    length = section_length(speed)
+    needed = max(SECTIONS * length, ZONE)
+    if way >= needed - 1e-6:
+        return ""
+    return f"way is only {way:.0f} m, a zone has {SECTIONS} sections of {length:g} m, {needed / 1e3:g} km at least"
+
+
+def extreme(position: Reals, series: Reals, speed: float, k: float, *, signed: bool = False) -> float:
+    """Largest value in the sense of the standard.
+
+    Args:
+        position: Chainages [m], shape (n,).
+        series: Samples, shape (n,).
+        speed: [m/s].
+        k: Factor of the standard deviation.
+        signed: Only the upper percentile counts, with its sign.
+    """
+    if shortfall(float(position[-1] - position[0]), speed):
+        return _percentile(series, signed)
+    length = section_length(speed)
+    edges = np.arange(position[0], position[-1] - length + 1e-6, length)
+    starts, ends = np.searchsorted(position, edges - 1e-9), np.searchsorted(position, edges + length - 1e-9)
+    sections = [_percentile(series[i:j], signed) for i, j in zip(starts, ends, strict=True)]
+    return float(np.mean(sections) + k * np.std(sections, ddof=1))
+
+
+def _percentile(series: Reals, signed: bool) -> float:
+    low, high = np.percentile(series, (0.15, 99.85))
+    return float(high) if signed else float(max(abs(low), abs(high)))
+
+
+def wheel_force_limit(static: float, speed: float) -> float:
+    """Limit of Q [kN]: 90 kN more than the static load, no more than the track bears.
+
+    Args:
+        static: Static wheel load [kN].
+        speed: [m/s].
+    """
+    return min(90.0 + static, Q_CAPS[bisect_left(Q_SPEEDS, 3.6 * speed - 1e-6)])
+
+
+def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
+    """Y/Q, sum of Y, and Q at the worst wheel or wheelset of a vehicle."""
+    found: dict[str, list[Index]] = {}
+    for w in ride.wheelsets(vehicle):
+        for index in _of_wheelset(ride, vehicle, w):
+            found.setdefault(index.name, []).append(index)
+    yield from map(worst, found.values())
+
+
+def _of_wheelset(ride: Ride, vehicle: int, wheelset: int) -> Iterator[Index]:
+    forces = ride.forces(wheelset)
+    speed, lacks = ride.speed, shortfall(ride.way, ride.speed)
+
+    def index(name: str, place: str, value: float, unit: str, limit: float, clause: str) -> Index:
+        place = f"wheelset {wheelset + 1}{place}"
+        return Index(
+            standard=STANDARD, name=name, vehicle=vehicle + 1, place=place, value=value, unit=unit, limit=limit,
+            clause=clause, shortfall=lacks,
+        )  # fmt: skip
+
+    for i, side in enumerate((" left", " right")):
+        value = extreme(*sliding_mean(forces.position, forces.quotient[:, i]), speed, SAFETY)
+        yield index("Y/Q, 2 m mean", side, value, "-", QUOTIENT_LIMIT, "7.5.2 running safety")
+        value = 1e-3 * extreme(forces.position, forces.Q[:, i], speed, OTHER, signed=True)
+        limit = wheel_force_limit(1e-3 * forces.static[i], speed)
+        yield index("wheel force Q", side, value, "kN", limit, "7.5.3 track loading")
+    value = 1e-3 * extreme(*sliding_mean(forces.position, forces.Y.sum(axis=1)), speed, SAFETY)
+    limit = 10.0 + 1e-3 * forces.static.sum() / 3.0  # k1 = 1: all but freight wagons
+    yield index("sum of Y, 2 m mean", "", value, "kN", limit, "7.5.2 running safety")
+
+
+def body_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
+    """Lateral and vertical acceleration at the worst floor point over a bogie."""
+    long_enough = ride.duration * BAND[0] >= 1.0
+    for direction in ("lateral", "vertical"):
+        found = []
+        for point in ride.floor(vehicle):
+            if not point.over_bogie:
+                continue
+            value = None
+            if long_enough:
+                series = band_pass(getattr(point, direction), ride.body_interval, *BAND)
+                value = extreme(ride.body_position, ride.behind_run_in(series), ride.speed, OTHER)
+            found.append(
+                Index(
+                    standard=STANDARD,
+                    name=f"{direction} acceleration",
+                    vehicle=vehicle + 1,
+                    place=point.name,
+                    value=value,
+                    unit="m/s^2",
+                    limit=ACCELERATION_LIMIT,
+                    clause="7.5.4 ride characteristics",
+                    shortfall=shortfall(ride.way, ride.speed),
+                    note="" if long_enough else "run shorter than a period of 0.4 Hz, 2.5 s",
+                )
+            )
+        yield worst(found)

@@ -1,0 +1,151 @@
+"""GB/T 5599-2019: stability, ride quality and the Sperling index W.
+
+Wheel forces: low pass of 20 Hz, means over 2 m every 0.5 m, largest value of the run (not the statistics of sections of
+appendix D, so that all are indices, no assessments). With Q the lateral, P the vertical force of
+a wheel, P0 the static axle load:
+
+    derailment coefficient Q/P,  wheel unloading (P_static - P)/P_static,  lateral axle force |Q_left + Q_right|.
+
+Sperling, from the amplitudes A [m/s^2] of a 5 s block's spectrum between 0.5 and 40 Hz, f [Hz]:
+
+    W = (sum W_i^10)^(1/10),   W_i = 3.57 (A_i^3 F(f_i) / f_i)^(1/10)
+
+    F vertical  0.325 f^2 below 5.9 Hz,  400/f^2 to 20 Hz,  1 above
+    F lateral   0.8 f^2   below 5.4 Hz,  650/f^2 to 26 Hz,  1 above
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from tiengine.filters import band_pass, sliding_mean
+from tiengine.index import Index, worst
+from tiengine.ride import FloorPoint, Forces, Ride
+
+__all__ = ["body_indices", "sperling", "sperling_weight", "unloading", "wheel_indices"]
+
+Reals = NDArray[np.float64]
+Direction = Literal["vertical", "lateral"]
+
+STANDARD = "GB/T 5599-2019"
+BLOCK = 5.0  # s
+BAND = (0.5, 40.0)  # Hz, of the Sperling index
+ACCELERATION_BAND = (0.5, 10.0)  # Hz
+ACCELERATION_LIMIT = 2.5  # m/s^2
+DERAILMENT_LIMIT = 0.8
+SLOW = 160.0 / 3.6  # m/s
+UNLOADING_LIMITS = (0.65, 0.80)  # up to 160 km/h, above
+SPERLING_CLASSES = ((2.5, "excellent"), (2.75, "good"), (3.0, "passed"))
+CURVES = {"vertical": (0.325, 5.9, 400.0, 20.0), "lateral": (0.8, 5.4, 650.0, 26.0)}
+
+
+def sperling_weight(frequency: Reals, direction: Direction) -> Reals:
+    """F at some frequencies [Hz]."""
+    rise, first, fall, second = CURVES[direction]
+    f = np.asarray(frequency, np.float64)
+    return np.where(f < first, rise * f**2, np.where(f < second, fall / np.maximum(f, first) ** 2, 1.0))
+
+
+def sperling(series: Reals, interval: float, direction: Direction) -> float | None:
+    """Sperling index of the worst 5 s block.
+
+    Args:
+        series: Acceleration [m/s^2], shape (n,).
+        interval: Between samples [s].
+        direction: Which weight.
+
+    Returns:
+        W, or None if the series is shorter than a block.
+    """
+    size = round(BLOCK / interval)
+    blocks = series[: len(series) // size * size].reshape(-1, size)
+    if not len(blocks):
+        return None
+    f = fft.rfftfreq(size, interval)
+    inside = (f >= BAND[0] - 1e-9) & (f <= BAND[1] + 1e-9)
+    A = 2.0 / size * np.abs(fft.rfft(blocks))[:, inside]
+    f = f[inside]
+    tenth_powers = np.sum(A**3 * sperling_weight(f, direction) / f, axis=1)
+    return float(3.57 * tenth_powers.max() ** 0.1)
+
+
+def unloading(P: Reals, static: float) -> float:
+    """Largest part of the static load that a wheel has lost.
+
+    Args:
+        P: Vertical force, shape (n,).
+        static: Load at rest, in the same unit.
+    """
+    return float((static - P.min()) / static)
+
+
+def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
+    """Derailment coefficient, wheel unloading and lateral axle force at the worst wheel or wheelset."""
+    found: dict[str, list[Index]] = {}
+    for w in ride.wheelsets(vehicle):
+        for name, side, value, unit, limit in _of_wheelset(ride.forces(w), ride.speed):
+            index = _index(ride, vehicle, name, f"wheelset {w + 1}{side}", value, unit, limit, "cl. 9, 10, app. D")
+            found.setdefault(name, []).append(index)
+    yield from map(worst, found.values())
+
+
+def _of_wheelset(forces: Forces, speed: float) -> Iterator[tuple[str, str, float, str, float]]:
+    """Name, side, value, unit, limit."""
+    for i, side in enumerate((" left", " right")):
+        _, quotient = sliding_mean(forces.position, forces.quotient[:, i])
+        yield "derailment coefficient", side, float(np.abs(quotient).max()), "-", DERAILMENT_LIMIT
+        _, P = sliding_mean(forces.position, forces.Q[:, i])
+        limit = UNLOADING_LIMITS[speed > SLOW + 1e-9]
+        yield "wheel unloading", side, unloading(P, float(forces.static.mean())), "-", limit
+    _, H = sliding_mean(forces.position, forces.Y.sum(axis=1))
+    limit = 15.0 + 1e-3 * float(forces.static.sum()) / 3.0
+    yield "lateral axle force", "", 1e-3 * float(np.abs(H).max()), "kN", limit
+
+
+def body_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
+    """Sperling index and body acceleration at the worst floor point over a bogie."""
+    points = [point for point in ride.floor(vehicle) if point.over_bogie]
+    directions: tuple[Direction, ...] = ("lateral", "vertical")
+    for direction in directions:
+        yield worst(_sperling_at(ride, vehicle, point, direction) for point in points)
+        yield worst(_acceleration_at(ride, vehicle, point, direction) for point in points)
+
+
+def _sperling_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Direction) -> Index:
+    series = ride.behind_run_in(getattr(point, direction))
+    value = sperling(series, ride.body_interval, direction)
+    if value is None:
+        note = "run shorter than a block of 5 s"
+    else:
+        note = next((words for bound, words in SPERLING_CLASSES if value <= bound), "failed")
+    limit = SPERLING_CLASSES[-1][0]
+    return _index(
+        ride, vehicle, f"Sperling index W, {direction}", point.name, value, "-", limit, "cl. 9, app. E", note
+    )  # fmt: skip
+
+
+def _acceleration_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Direction) -> Index:
+    value, note = None, "run shorter than a period of 0.5 Hz, 2 s"
+    if ride.duration * ACCELERATION_BAND[0] >= 1.0:
+        series = band_pass(getattr(point, direction), ride.body_interval, *ACCELERATION_BAND)
+        value, note = float(np.abs(ride.behind_run_in(series)).max()), ""
+    return _index(
+        ride, vehicle, f"{direction} acceleration", point.name, value, "m/s^2", ACCELERATION_LIMIT,
+        "cl. 9, app. D", note,
+    )  # fmt: skip
+
+
+def _index(
+    ride: Ride, vehicle: int, name: str, place: str, value: float | None, unit: str, limit: float, clause: str,
+    note: str = "",
+) -> Index:  # fmt: skip
+    lacks = f"largest value on {ride.way:.0f} m instead of the statistics of sections of app. D"
+    return Index(
+        standard=STANDARD, name=name, vehicle=vehicle + 1, place=place, value=value, unit=unit, limit=limit,
+        clause=clause, shortfall=lacks, note=note,
+    )  # fmt: skip

@@ -1,0 +1,136 @@
+"""All indices of a result, train by train, as values and as JSON; what they mean is told in docs/indices.md."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+from tiengine import comfort, en14363, gb5599
+from tiengine.index import Index
+from tiengine.quantity import InputError
+from tiengine.ride import Ride
+
+if TYPE_CHECKING:
+    from tiengine.results import Result
+    from tiengine.scenario import Scenario
+
+__all__ = ["Metrics", "Spread", "TrainMetrics", "evaluate"]
+
+FORMAT, FORMAT_VERSION = "tiengine-metrics", 1
+METHODS = (
+    en14363.wheel_indices,
+    en14363.body_indices,
+    gb5599.wheel_indices,
+    gb5599.body_indices,
+    comfort.en12299_indices,
+    comfort.iso2631_indices,
+)
+
+
+@dataclass(frozen=True)
+class TrainMetrics:
+    """Indices of one train.
+
+    Attributes:
+        train: Its number in the file.
+        way: Way that counts, without the run-in [m].
+        indices: Vehicle by vehicle.
+    """
+
+    train: int
+    way: float
+    indices: tuple[Index, ...]
+
+
+@dataclass(frozen=True)
+class Spread:
+    """One index over the trains of a batch.
+
+    Attributes:
+        worst: The worst of all trains.
+        train: Whose it is.
+        median: Over the trains that have a value; None if there is none.
+        over: Trains beyond the limit.
+        trains: Trains with a value.
+    """
+
+    worst: Index
+    train: int
+    median: float | None
+    over: int
+    trains: int
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """Indices of a result.
+
+    Attributes:
+        name: Path of the file.
+        trains: Those that were evaluated.
+        failed: Why others were not, by their number: they did not run to the end.
+    """
+
+    name: str
+    trains: tuple[TrainMetrics, ...]
+    failed: dict[int, str]
+
+    def spread(self) -> tuple[Spread, ...]:
+        """Every index over all trains; of vehicles of different trains those at the same place in the train."""
+        groups: dict[tuple[str, str, int], list[tuple[int, Index]]] = {}
+        for train in self.trains:
+            for index in train.indices:
+                groups.setdefault((index.standard, index.name, index.vehicle), []).append((train.train, index))
+        return tuple(map(_spread, groups.values()))
+
+    def to_json(self) -> str:
+        """JSON text with a format version."""
+        tables: dict[str, Any] = {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "file": self.name,
+            "trains": [
+                {"train": t.train, "way_m": t.way, "indices": [index.to_dict() for index in t.indices]}
+                for t in self.trains
+            ],
+            "failed": {str(train): why for train, why in self.failed.items()},
+        }
+        return json.dumps(tables, indent=2)
+
+
+def evaluate(result: Result, train: int | None = None) -> Metrics:
+    """Compute the indices of a result.
+
+    Args:
+        result: An open file.
+        train: Number of one train; all if None.
+
+    Raises:
+        InputError: No such train, none that has run to its end, channels are missing, the sampling is too coarse or
+            the run too short.
+    """
+    if train is not None and not 0 <= train < result.trains:
+        raise InputError(f"{result.name}: train = {train}: must be from 0 to {result.trains - 1}")
+    asked = range(result.trains) if train is None else [train]
+    failed = {i: why for i, why in result.failures.items() if i in asked}
+    done = [i for i in asked if i not in failed]
+    if not done:
+        raise InputError(f"{result.name}: no train has run to its end: {next(iter(failed.values()), 'there is none')}")
+    members = result.scenario.members
+    return Metrics(result.name, tuple(_train(result, i, members[i]) for i in done), failed)
+
+
+def _train(result: Result, train: int, scenario: Scenario) -> TrainMetrics:
+    ride = Ride(result, train, scenario)
+    vehicles = range(len(ride.vehicles))
+    return TrainMetrics(train, ride.way, tuple(x for v in vehicles for method in METHODS for x in method(ride, v)))
+
+
+def _spread(entries: Sequence[tuple[int, Index]]) -> Spread:
+    train, index = max(entries, key=lambda entry: entry[1].severity)
+    values = [entry.value for _, entry in entries if entry.value is not None]
+    over = sum(entry.verdict == "over" for _, entry in entries)
+    return Spread(index, train, median(values) if values else None, over, len(values))

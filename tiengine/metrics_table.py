@@ -1,0 +1,66 @@
+"""Indices on the screen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rich.console import Group, RenderableType
+from rich.markup import escape
+from rich.table import Table
+
+from tiengine.index import Index
+from tiengine.metrics import Metrics
+
+__all__ = ["metrics_table"]
+
+COLOURS = {"within": "green", "over": "bold red", "none": "dim"}
+
+
+def metrics_table(metrics: Metrics) -> RenderableType:
+    """A table of one train's indices, or of the worst and the median over several trains; notes below it."""
+    spread = metrics.spread()
+    several = len(metrics.trains) > 1
+    table = Table(box=None, pad_edge=False)
+    table.add_column("index", overflow="fold")
+    table.add_column("worst at", overflow="fold")
+    for name in ("value", "limit", "unit"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    table.add_column("kind", no_wrap=True)
+    if several:
+        table.add_column("median", justify="right")
+        table.add_column("train", justify="right")
+    table.add_column("clause", overflow="fold")
+    vehicles = {each.worst.vehicle for each in spread}
+    heading = ("", "")
+    for each in spread:
+        index = each.worst
+        title = f"vehicle {index.vehicle}, {index.standard}" if len(vehicles) > 1 else index.standard
+        if (title, index.standard) != heading:
+            heading = (title, index.standard)
+            table.add_row(f"[bold]{escape(title)}[/bold]")
+        row = [f"  {index.name}", index.place, _number(index.value), _number(index.limit), index.unit]
+        extra = [_number(each.median), str(each.train)] if several else []
+        verdict = f"{index.verdict} ({each.over} of {each.trains} over)" if each.over and several else index.verdict
+        colour = COLOURS[index.verdict]
+        table.add_row(
+            *map(escape, row), f"[{colour}]{verdict}[/{colour}]", index.kind, *map(escape, extra), escape(index.clause)
+        )
+    return Group(table, "", *map(escape, _notes([each.worst for each in spread], metrics)))
+
+
+def _notes(indices: Iterable[Index], metrics: Metrics) -> list[str]:
+    """What the table leaves out, each sentence once."""
+    found: dict[str, None] = {}
+    for index in indices:
+        if index.shortfall:
+            found[f"{index.standard}: indices, not an assessment: {index.shortfall}"] = None
+    for index in indices:
+        if index.note:
+            found[f"{index.standard}: {index.name}: {index.note}"] = None
+    lines = [f"train {train} is left out: {why}" for train, why in metrics.failed.items()]
+    return [*found, *lines]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

@@ -1,0 +1,264 @@
+"""Profiles from files: SIMPACK ``.prw`` and ``.prr``, MiniProf ``.whl`` and ``.ban``, two columns of text.
+
+SIMPACK: ``key = value`` in the sections ``header`` and ``spline``, points between ``point.begin`` and ``point.end``,
+``!`` for comments. The spline's keys are carried out on the points in the order in which the format numbers them:
+least distance, shift, rotation, bounds, mirrors, inversion; ``units.len.f`` is user's lengths a metre. The weights of
+points and ``approx.smooth`` are not used.
+
+MiniProf: ``key=value`` lines (or the old style's free text), then rows of the columns that ``ColumnDef`` names, x and y
+first unless it says otherwise; ``"``, ``!`` and ``%`` begin comments.
+
+Text: y and z, separated by commas, semicolons or blanks, ``#`` for comments, y rising or falling from line to line.
+
+Text and MiniProf hold millimetres or metres; a profile's width tells which. Nothing of a file is ever evaluated.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.profile_frame import FEWEST_POINTS, Kind, PointList, check_kinks, oriented
+from tiengine.quantity import InputError
+
+__all__ = ["FORMATS", "read_profile", "read_text_file"]
+
+Reals = NDArray[np.float64]
+
+LARGEST_FILE = 10_000_000  # bytes
+WIDTH = (10.0, 400.0)  # mm, what a list of points may span
+Lines = Sequence[tuple[int, str]]
+"""Numbered lines."""
+
+
+def read_profile(path: str | Path, kind: Kind, where: str = "") -> PointList:
+    """The points of a file, oriented and found to be smooth.
+
+    Args:
+        path: A file; its suffix tells the format, any other than those of :data:`FORMATS` means two columns.
+        kind: ``"wheel"`` or ``"rail"``.
+        where: Name of the profile for messages; kind and path if empty.
+
+    Returns:
+        y and z in mm, y outward and z down; a wheel's flange, a rail's head tell the directions.
+
+    Raises:
+        InputError: The file breaks a rule; the message names the file, the line and the rule.
+    """
+    where = where or f"{kind} profile {str(path)!r}"
+    lines = list(enumerate(read_text_file(path, where, LARGEST_FILE).splitlines(), start=1))
+    found = FORMATS.get(Path(path).suffix.lower(), _read_columns)(lines, kind, where)
+    if len(found.points) < FEWEST_POINTS:
+        raise InputError(f"{where}: {len(found.points)} points; at least {FEWEST_POINTS} pairs expected")
+    width = float(np.ptp(found.points[:, 0]))
+    if not WIDTH[0] <= width <= WIDTH[1]:
+        raise InputError(f"{where}: {width:g} mm wide; {WIDTH[0]:g} to {WIDTH[1]:g} mm expected: are its units right?")
+    away = np.abs(found.points[:, 1] - np.median(found.points[:, 1]))
+    if away.max() > WIDTH[1]:
+        i = int(np.argmax(away))
+        raise InputError(
+            f"{where}: line {found.lines[i]}: z lies {away[i]:g} mm from the other points';"
+            f" at most {WIDTH[1]:g} mm expected"
+        )
+    found = oriented(found, kind)
+    check_kinks(found, kind)
+    return found
+
+
+def read_text_file(path: str | Path, where: str, largest: int) -> str:
+    """A text of bounded size; what is not UTF-8 is read as Latin-1, which only comments may need.
+
+    Args:
+        path: The file.
+        where: Its name for messages.
+        largest: Greatest size [bytes].
+
+    Raises:
+        InputError: The file cannot be read, is too large, or is no text.
+    """
+    try:
+        with open(path, "rb") as file:
+            data = file.read(largest + 1)
+    except OSError as error:
+        raise InputError(f"{where}: cannot be read ({error.strerror or error})") from None
+    if len(data) > largest:
+        raise InputError(f"{where}: larger than {largest / 1e6:g} MB, which no such file is")
+    if b"\0" in data:
+        raise InputError(f"{where}: line {data[: data.index(0)].count(10) + 1}: not a text file")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def _numbers(fields: Sequence[str]) -> list[float] | None:
+    """The fields as numbers, None if one is not."""
+    try:
+        return [float(field) for field in fields]
+    except ValueError:
+        return None
+
+
+def _point_list(rows: Sequence[Sequence[float]], numbers: Sequence[int], where: str) -> PointList:
+    """Rows (y, z) of finite numbers."""
+    points = np.array(rows, dtype=np.float64).reshape(-1, 2)
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        y, z = points[bad[0]]
+        line = f"line {numbers[bad[0]]}: point {bad[0] + 1}"
+        raise InputError(f"{where}: {line} is ({y}, {z}); finite numbers expected")
+    return PointList(points, np.array(numbers, dtype=np.int64), where)
+
+
+def _in_millimetres(found: PointList) -> PointList:
+    """The points, whose width tells metres from millimetres, in millimetres."""
+    in_metres = len(found.points) > 0 and float(np.ptp(found.points[:, 0])) <= 1e-3 * WIDTH[1]
+    return PointList(found.points * 1e3, found.lines, found.where) if in_metres else found
+
+
+def _read_columns(lines: Lines, kind: Kind, where: str) -> PointList:
+    """Two columns; y must rise, or fall, from line to line."""
+    rows, numbers = [], []
+    for number, line in lines:
+        fields = line.split("#")[0].replace(",", " ").replace(";", " ").split()
+        if not fields:
+            continue
+        values = _numbers(fields)
+        if values is None or len(values) != 2:
+            raise InputError(f"{where}: line {number} is {line.strip()[:80]!r}; two numbers, y and z in mm, expected")
+        rows.append(values)
+        numbers.append(number)
+    found = _point_list(rows, numbers, where)
+    y = found.points[:, 0]
+    if y.size > 1:
+        step = np.diff(y) * (1.0 if y[-1] >= y[0] else -1.0)
+        back = np.flatnonzero(step <= 0.0)
+        if back.size:
+            i = back[0] + 1
+            word = "increase" if y[-1] >= y[0] else "decrease"
+            raise InputError(
+                f"{where}: line {numbers[i]}: y goes from {y[i - 1]:.9g} to {y[i]:.9g} at point {i + 1};"
+                f" y must {word} from point to point"
+            )
+    return _in_millimetres(found)
+
+
+def _read_miniprof(lines: Lines, kind: Kind, where: str) -> PointList:
+    """Header lines, then rows of columns."""
+    header: dict[str, str] = {}
+    rows: list[list[float]] = []
+    numbers: list[int] = []
+    columns: tuple[int, int] | None = None
+    for number, line in lines:
+        text = re.split('["!%]', line)[0].strip()
+        values = _numbers(text.replace(",", " ").replace(";", " ").split())
+        if not text or (values is None and not rows):
+            key, equals, value = text.partition("=")
+            if equals:
+                header[key.strip().lower()] = value.strip()
+            continue
+        columns = columns or _miniprof_columns(header.get("columndef", "X,Y"), where)
+        if values is None or len(values) <= max(columns):
+            raise InputError(
+                f"{where}: line {number} is {line.strip()[:80]!r}; {max(columns) + 1} or more numbers expected"
+            )
+        rows.append([values[column] for column in columns])
+        numbers.append(number)
+    promised = _numbers([header.get("xypoints", "")])
+    if promised and promised[0] > len(rows):
+        last = numbers[-1] if numbers else len(lines)
+        raise InputError(f"{where}: line {last}: {len(rows)} points; XYPoints = {promised[0]:g} are expected")
+    return _in_millimetres(_point_list(rows, numbers, where))
+
+
+def _miniprof_columns(definition: str, where: str) -> tuple[int, int]:
+    """Where x and y stand in a row."""
+    names = [name.strip().upper() for name in definition.split(",")]
+    if "X" not in names or "Y" not in names:
+        raise InputError(f"{where}: ColumnDef = {definition!r}: must name X and Y")
+    return names.index("X"), names.index("Y")
+
+
+def _read_simpack(lines: Lines, kind: Kind, where: str) -> PointList:
+    """Sections of keys and one of points."""
+    keys: dict[str, tuple[int, str]] = {}
+    rows: list[list[float]] = []
+    numbers: list[int] = []
+    section: list[str] = []
+    is_complete = False
+    for number, line in lines:
+        text = line.split("!")[0].strip()
+        if text.endswith(".begin"):
+            section.append(text.removesuffix(".begin"))
+        elif text.endswith(".end"):
+            is_complete |= text == "point.end" and section[-1:] == ["point"]
+            section = section[:-1]
+        elif "=" in text:
+            key, _, value = text.partition("=")
+            keys[f"{section[-1] if section else ''}:{key.strip().lower()}"] = (number, value.strip())
+        elif text and section[-1:] == ["point"]:
+            values = _numbers(text.split())
+            if values is None or len(values) < 2:
+                raise InputError(f"{where}: line {number} is {line.strip()[:80]!r}; y, z and a weight expected")
+            rows.append(values[:2])
+            numbers.append(number)
+    if not is_complete:
+        raise InputError(f"{where}: line {len(lines)}: ends without point.begin ... point.end; is the file cut off?")
+    if "header:type" in keys and (given := _simpack_number(keys, "header:type", 0.0, where)) != (kind == "wheel"):
+        number = keys["header:type"][0]
+        raise InputError(f"{where}: line {number}: header type = {given:g}: must be 0 for a rail, 1 for a wheel")
+    return _simpack_processed(_point_list(rows, numbers, where), keys)
+
+
+def _simpack_number(keys: dict[str, tuple[int, str]], key: str, default: float, where: str) -> float:
+    """Value of a key."""
+    number, text = keys.get(key, (0, str(default)))
+    values = _numbers([text])
+    if values is None or not np.isfinite(values[0]):
+        raise InputError(f"{where}: line {number}: {key.partition(':')[2]} = {text!r}: must be a number")
+    return values[0]
+
+
+def _simpack_processed(found: PointList, keys: dict[str, tuple[int, str]]) -> PointList:
+    """The points after what the file says is to be done with them [mm]."""
+
+    def value(key: str, default: float = 0.0) -> float:
+        return _simpack_number(keys, f"spline:{key}", default, found.where)
+
+    per_metre, per_radian = value("units.len.f", 1000.0), value("units.ang.f", 1.0)
+    for name, factor in (("units.len.f", per_metre), ("units.ang.f", per_radian)):
+        if factor <= 0.0:
+            line = keys[f"spline:{name}"][0]
+            raise InputError(f"{found.where}: line {line}: {name} = {factor:g}: must be > 0")
+    points, lines = found.points, found.lines
+    if (least := value("point.dist.min")) > 0.0:
+        kept = [0]
+        for i in range(1, len(points)):
+            if np.hypot(*(points[i] - points[kept[-1]])) >= least:
+                kept.append(i)
+        points, lines = points[kept], lines[kept]
+    points = points + np.array([value("shift.y"), value("shift.z")])
+    if angle := value("rotate") / per_radian:
+        points = points @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    for axis, name in enumerate("yz"):
+        low, high = value(f"bound.{name}.min"), value(f"bound.{name}.max")
+        if low < high:  # the other way round they are switched off
+            within = (points[:, axis] >= low) & (points[:, axis] <= high)
+            points, lines = points[within], lines[within]
+    points = points * [-1.0 if value("mirror.y") else 1.0, -1.0 if value("mirror.z") else 1.0]
+    if value("inversion"):
+        points, lines = points[::-1], lines[::-1]
+    return PointList(points * (1000.0 / per_metre), lines, found.where)
+
+
+FORMATS: dict[str, Callable[[Lines, Kind, str], PointList]] = {
+    ".prw": _read_simpack,
+    ".prr": _read_simpack,
+    ".whl": _read_miniprof,
+    ".ban": _read_miniprof,
+}
+"""Readers by suffix."""
