@@ -31,7 +31,7 @@ def case(values, **data):
 def test_runs_are_scenarios(name):
     run = RUNS[name]
     scenario = load_scenario(run.scenario, settings_of(run, 100.0))
-    assert scenario.numerics.time_step == 2e-4
+    assert scenario.numerics.time_step == 2.5e-4
     assert scenario.train.distance == 100.0
     assert len(scenario.members) == (64 if name.startswith("batch") else 1)
     if name != "way":
