@@ -39,10 +39,11 @@ def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool
         outcomes.append(evaluate(case))
         last = outcomes[-1]
         console.print(f"{last.verdict:16} {case.name}  {last.seconds:.1f} s", highlight=False)
+        if write:  # at once: a run of forty minutes that is stopped loses nothing
+            REPORT.parent.mkdir(exist_ok=True)
+            known = keep([last], REPORT.with_suffix(".json"), CASES)
     show(outcomes, console)
     if write:
-        REPORT.parent.mkdir(exist_ok=True)
-        known = keep(outcomes, REPORT.with_suffix(".json"), CASES)
         REPORT.write_text(f"# Verification\n\n{markdown(known)}", encoding="utf-8")
         insert(headlines(known, HEADLINES), ROOT / "README.md")
     sys.exit(any(outcome.verdict == "MISS" for outcome in outcomes))
