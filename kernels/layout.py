@@ -63,7 +63,7 @@ MOTION_ROWS = 7
     RESIDUAL_VERTICAL,  # compliance of the modes left out, under a wheel, in w, v, theta_x; zero if not wanted
     RESIDUAL_LATERAL,
     RESIDUAL_TORSION,
-    ABSORBING_ZONE,  # length of the zone with more fastening, to the ground, at either end of the window [m]; zero for none
+    ABSORBING_ZONE,  # length of the zones at the window's ends with more fastening, to the ground [m]
     N_CONSTANTS,
 ) = range(31)
 

@@ -67,7 +67,7 @@ class Ingredients:
         cover: Enough slabs for every seat of the window, or the paper's count.
         explicit_mortar: The bed in the explicit half.
         local_compliance: Add the static compliance of the modes left out, under the wheels.
-        absorbing_zone: Length of the zones at the window's ends with springs and dampers from rail to ground [m]; 0 for none.
+        absorbing_zone: Length of the zones at the window's ends with more fastening, to the ground [m]; 0 for none.
         trains: Trains advanced together.
     """
 

@@ -93,9 +93,10 @@ class Numerics(Params):
     rail on its fastenings. The source paper has 1.7 modes a metre and 8 m.
 
     The blow that ends a wheel's flight sends waves of 1 to 3 kHz along the rail, at the speed of shear, 2030 m/s; the
-    window's pinned ends send them back. An ``absorbing_zone`` at either end, with springs and dampers from rail to ground
-    up to as strong as the fastenings', swallows most of them: with 6 m in a window of 36 m the largest echo, 0.27 % of the peak
-    force, falls to 0.14 %. It must keep 2 m from the wheels, hence there is none in the default's shorter window.
+    window's pinned ends send them back. An ``absorbing_zone`` at either end, with springs and dampers from rail to
+    ground up to as strong as the fastenings', swallows most of them: with 6 m in a window of 36 m the largest echo,
+    0.27 % of the peak force, falls to 0.14 %. It must keep 2 m from the wheels, hence there is none in the default's
+    shorter window.
     """
 
     modes_per_metre: Annotated[float, Q("1/m", "trial functions per field and metre of window", ge=0.2, le=20)] = 6.5
@@ -105,9 +106,7 @@ class Numerics(Params):
     start: Literal["equilibrium", "zero"] = "equilibrium"
     mortar: Literal["implicit", "explicit"] = "implicit"
     truncation: Literal["none", "local"] = "local"
-    absorbing_zone: Annotated[
-        float, Q("m", "at either end of the window, with springs and dampers to the ground", ge=0)
-    ] = 0.0
+    absorbing_zone: Annotated[float, Q("m", "at either end of the window", ge=0)] = 0.0
     slab_count: Literal["cover", "paper"] = "cover"
     threads: Annotated[int, Q("-", "of Taichi's loop over trains; one train alone runs on one", ge=1, le=1024)] = 1
 
