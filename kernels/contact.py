@@ -187,6 +187,15 @@ def newton_step(
 
 
 @ti.func
+def felt_at(b: int, step: int, wheelset: int, irregularity: Array):
+    """Track channels under a wheelset in a step."""
+    felt = ti.Vector.zero(ti.f64, at.N_IRREGULARITY)
+    for m in ti.static(range(at.N_IRREGULARITY)):
+        felt[m] = irregularity[b, step, wheelset, m]
+    return felt
+
+
+@ti.func
 def solve_wheelset(
     b: int, wheelset: int, V: float, x_free: Template, dx_free: Template, free_l: Template, free_r: Template,
     irregularity: Template, dims: Array, constants: Array, wheel: Array, table: Array, wheelset_compliance: Array,

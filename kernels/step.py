@@ -218,9 +218,7 @@ def forces_and_contact(
             for w in range(wheelsets):
                 uw.add_wheelset_force(b, w, 1.0, dims, wheelset_dof, wheelset_force, motion)
             for w in range(wheelsets):
-                felt = ti.Vector.zero(ti.f64, at.N_IRREGULARITY)
-                for m in ti.static(range(at.N_IRREGULARITY)):
-                    felt[m] = irregularity[b, step, w, m]
+                felt = ct.felt_at(b, step, w, irregularity)
                 x, dx = uw.wheelset_without_change(b, w, dims, constants, wheelset_dof, vehicle_answer, motion)
                 left = uw.rail_without_change(
                     b, w, 0, dims, constants, rail_answer, rail_coupling, motion, rail_predicted, rail_force

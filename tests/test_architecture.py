@@ -20,8 +20,8 @@ LAYERS = [
     {"state", "scratch", "track_static"},
     {"stepper", "start", "setup"},
     {"ride", "en14363", "gb5599", "comfort", "metrics", "metrics_table", "results", "writer",
-     "recorder", "events", "stability", "prepare", "products", "stage_split", "timed_loop"},
-    {"march", "worker", "gather"},
+     "recorder", "events", "stability", "prepare", "products", "stage_split"},
+    {"march", "worker", "gather", "timed_loop"},
     {"simulate", "profiling", "contact_report"},
     {"cli"},
 ]  # fmt: skip

@@ -34,7 +34,7 @@ from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper
 from tiengine.writer import Block, TrainLabels
 
-__all__ = ["Advanced", "Begun", "Costs", "Ended", "Lost", "Message", "march"]
+__all__ = ["CHUNK_STEPS", "Advanced", "Begun", "Costs", "Ended", "Lost", "Message", "Run", "march"]
 
 CHUNK_STEPS = 1000
 
@@ -129,7 +129,7 @@ def march(task: Task, *, public: bool = False) -> Iterator[Message]:
     """
     clock = time.perf_counter()
     try:
-        run = _Run.begin(task, public)
+        run = Run.begin(task, public)
     except InputError as error:
         yield Lost(task.trains, str(error), refused=True)
         return
@@ -142,7 +142,7 @@ def march(task: Task, *, public: bool = False) -> Iterator[Message]:
 
 
 @dataclass(eq=False)
-class _Run:
+class Run:
     """Trains on their way.
 
     Attributes:
@@ -164,8 +164,16 @@ class _Run:
     alive: list[int]
 
     @classmethod
-    def begin(cls, task: Task, public: bool) -> _Run:
-        """Set up: model, start, buffers, kernels."""
+    def begin(cls, task: Task, public: bool = False) -> Run:
+        """Set up: model, start, buffers, kernels.
+
+        Args:
+            task: The trains.
+            public: Launch kernels by public Taichi calls only.
+
+        Raises:
+            InputError: The scenario breaks a rule that only shows in set-up.
+        """
         scenario = task.scenario
         model, jit = prepare(scenario, public, task.size)
         recorder = Recorder(scenario, model.given.newmark.dt)

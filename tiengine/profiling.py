@@ -17,23 +17,18 @@ import numpy as np
 from taichi.lang import impl
 from threadpoolctl import threadpool_limits
 
-from tiengine.irregularity import make_irregularity
 from tiengine.kernels import layout as at
 from tiengine.machine import import_seconds, this_machine, versions
+from tiengine.march import CHUNK_STEPS, Run
 from tiengine.memory import peak_memory
 from tiengine.plan import Task, plan
-from tiengine.prepare import prepare
 from tiengine.products import Work, count_products
 from tiengine.profile_report import Loop, Memory, ProfileReport, Rate, Stage, Wall
 from tiengine.quantity import InputError
-from tiengine.recorder import Recorder
 from tiengine.roofs import Roofs, measure_roofs
 from tiengine.scenario import Scenario, load_scenario, to_toml
 from tiengine.stage_split import contact_us, suspension_us
-from tiengine.start import equilibrium, release
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
-from tiengine.timed_loop import CHUNK_STEPS, REST, StageTimers, TimedLoop, Times, shown
+from tiengine.timed_loop import REST, StageTimers, TimedLoop, Times, shown
 from tiengine.writer import Writer
 
 __all__ = ["array_bytes", "profile"]
@@ -106,28 +101,17 @@ def _task(scenario: Scenario, trains: int | None) -> Task:
 def _set_up(task: Task, importing: float, folder: Path) -> tuple[TimedLoop, Wall]:
     """Everything before the loop, as a run does it."""
     started = time.perf_counter()
-    scenario = task.scenario
-    model, jit = prepare(scenario, trains=task.size)
-    recorder = Recorder(scenario, model.given.newmark.dt)
-    state, first = State.at_rest(model), scenario.rear + model.centre_s
-    if scenario.numerics.start == "equilibrium":
-        equilibrium(model, state, scenario.rear, *scenario.train.speed.at(first))
-    else:
-        release(model, state, scenario.rear)
-    rows = (CHUNK_STEPS // every + 1 for every in (recorder.wheel_every, recorder.body_every))
-    parallel = scenario.numerics.threads > 1 and task.size > 1
-    stepper = Stepper(model, state, Chunk.empty(model, CHUNK_STEPS, *rows), parallel=parallel)
-    jit += stepper.compile()
-    lead = scenario.rear + float(model.wheel_s.max())
-    tracks = [make_irregularity(track, lead) for track in task.tracks]
+    scenario, run = task.scenario, Run.begin(task)
+    model, recorder, stepper = run.model, run.recorder, run.stepper
     labels = [recorder.labels(model.given.train, model.given.slots)] * task.size
     precision = scenario.output.precision
     writer = Writer(folder / "profile.h5", to_toml(scenario), {}, labels, recorder.groups(), precision)
+    first = scenario.rear + model.centre_s
     end = first + scenario.train.distance
-    loop = TimedLoop(scenario, stepper, StageTimers(stepper), recorder, writer, tracks, first, end)
+    loop = TimedLoop(scenario, stepper, StageTimers(stepper), recorder, writer, run.tracks, first, end)
     generation = float(impl.get_runtime().prog.get_total_compilation_time())
-    setup = time.perf_counter() - started - jit
-    return loop, Wall(import_s=importing, jit_s=jit, code_generation_s=generation, setup_s=setup)
+    setup = time.perf_counter() - started - run.jit
+    return loop, Wall(import_s=importing, jit_s=run.jit, code_generation_s=generation, setup_s=setup)
 
 
 def _measure(loop: TimedLoop, wall: Wall, steps: int) -> ProfileReport:

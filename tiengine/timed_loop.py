@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from tiengine.events import RunFailedError, check_chunk
 from tiengine.irregularity import Irregularity
+from tiengine.march import CHUNK_STEPS
 from tiengine.quantity import InputError
 from tiengine.recorder import Recorder
 from tiengine.scenario import Scenario
 from tiengine.stepper import Stepper
 from tiengine.writer import Writer
 
-__all__ = ["CHUNK_STEPS", "REST", "StageTimers", "TimedLoop", "Times", "shown"]
+__all__ = ["REST", "StageTimers", "TimedLoop", "Times", "shown"]
 
-CHUNK_STEPS = 1000
 BLOCK_STEPS = 100
 
 

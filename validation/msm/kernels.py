@@ -344,9 +344,7 @@ def implicit_and_contact(
             for side in ti.static(range(2)):
                 rail_under_wheel(w, side, speed, shape_out, rails, rail_free_out)
         for w in range(dims[at.WHEELSETS]):
-            felt = ti.Vector.zero(ti.f64, at.N_IRREGULARITY)
-            for k in ti.static(range(at.N_IRREGULARITY)):
-                felt[k] = irregularity[0, step, w, k]
+            felt = ct.felt_at(0, step, w, irregularity)
             ct.solve_wheelset(
                 0, w, speed, wheelset_now(w, at.U, wheelset_dof, motion), wheelset_now(w, at.V, wheelset_dof, motion),
                 uw.stored_rail(0, w, 0, rail_free_out), uw.stored_rail(0, w, 1, rail_free_out), felt, dims, constants,
