@@ -8,7 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["BODY", "DOFS", "GROUPS", "IRREGULARITY", "MORTAR", "SIDES", "WHEEL", "Channel"]
+__all__ = [
+    "BODY", "DEFLECTION", "DIRECTIONS", "DOFS", "GAUGE_FORCE", "GAUGE_MOTION", "GROUPS", "IRREGULARITY", "MORTAR",
+    "SEATS", "SIDES", "SLABS", "WHEEL", "Channel",
+]  # fmt: skip
 
 
 class Channel(NamedTuple):
@@ -25,6 +28,7 @@ class Channel(NamedTuple):
 
 SIDES = ("left", "right")
 DOFS = ("y", "z", "roll", "pitch", "yaw")
+DIRECTIONS = ("y", "z")
 
 WHEEL = {
     "normal_force": Channel("N", "normal contact force, zero when the wheel has lifted off"),
@@ -66,4 +70,53 @@ MORTAR = {
 }
 """Dimensions (time, slot); the slabs in the window, each in the slot of its index modulo the number of slots."""
 
-GROUPS = {"wheel": WHEEL, "body": BODY, "irregularity": IRREGULARITY, "mortar": MORTAR}
+SEATS = {
+    "largest_vertical_force": Channel("N", "largest vertical force of the rail on the fastening, positive down"),
+    "smallest_vertical_force": Channel("N", "smallest vertical force of the rail on the fastening, negative is uplift"),
+    "largest_lateral_force": Channel("N", "largest lateral force of the rail on the fastening, positive to the right"),
+    "smallest_lateral_force": Channel("N", "smallest lateral force of the rail on the fastening"),
+    "factor": Channel("1", "factor of the defects on the fastening's stiffness, 1 sound, 0 failed"),
+}
+"""Dimensions (seat, side); extremes over every time step."""
+
+SLABS = {
+    "largest_pressure": Channel("Pa", "largest pressure of the mortar, dead weight included"),
+    "smallest_pressure": Channel("Pa", "smallest pressure of the mortar, dead weight included"),
+    "largest_deflection": Channel("m", "largest deflection of the slab, positive down, from rest under its weight"),
+    "smallest_deflection": Channel("m", "smallest deflection of the slab"),
+    "largest_moment_x": Channel("N m/m", "largest bending moment along the track, positive with tension underneath"),
+    "smallest_moment_x": Channel("N m/m", "smallest bending moment along the track"),
+    "largest_moment_y": Channel("N m/m", "largest bending moment across the track, positive with tension underneath"),
+    "smallest_moment_y": Channel("N m/m", "smallest bending moment across the track"),
+    "mortar_factor": Channel("1", "smallest factor of the voids under the slab on its bed, 1 without"),
+}
+"""Dimensions (slab,); extremes over the slab and over the bodies' samples."""
+
+DEFLECTION = {
+    "rail": Channel("m", "vertical deflection of the rail, positive down"),
+    "slab": Channel("m", "vertical deflection of the slab under the rail, positive down; not a number over joints"),
+}
+"""Dimensions (time, side, point)."""
+
+GAUGE_MOTION = {
+    "displacement": Channel("m", "displacement of the place: y right, z down"),
+    "velocity": Channel("m/s", "velocity of the place: y right, z down"),
+    "acceleration": Channel("m/s^2", "acceleration of the place: y right, z down"),
+}
+"""Of a gauge on rail or slab; dimensions (time, direction)."""
+
+GAUGE_FORCE = {
+    "vertical_force": Channel("N", "vertical force of the rail on the fastening, positive down"),
+    "lateral_force": Channel("N", "lateral force of the rail on the fastening, positive to the right"),
+}
+"""Of a gauge on a fastening; dimensions (time,)."""
+
+GROUPS = {
+    "wheel": WHEEL,
+    "body": BODY,
+    "irregularity": IRREGULARITY,
+    "mortar": MORTAR,
+    "seats": SEATS,
+    "slabs": SLABS,
+    "deflection": DEFLECTION,
+}

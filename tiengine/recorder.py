@@ -98,6 +98,10 @@ class Recorder:
         """Rows of the bodies' record that ``count`` steps after ``done`` fill."""
         return (done + count) // self.body_every - done // self.body_every
 
+    def ends(self, first: int, count: int) -> NDArray[np.float64]:
+        """Ends of ``count`` steps from number ``first`` on [s], shape (count,)."""
+        return np.asarray(np.arange(first, first + count) * self.dt, np.float64)
+
     def groups(self) -> dict[str, GroupSpec]:
         """What each train records."""
         return self.groups_of(self.scenario)

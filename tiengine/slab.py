@@ -19,6 +19,7 @@ from pydantic import ValidationInfo, field_validator
 
 from tiengine.kernels import plate
 from tiengine.mortar import GAUSS, Mortar, MortarVoid, bed_factors
+from tiengine.plate_shapes import WY, W, element_dofs, shapes_at, tabulate_shapes
 from tiengine.presets import find_preset, load_toml, preset_names
 from tiengine.quantity import InputError, Params, Q, build
 
@@ -27,6 +28,7 @@ __all__ = ["GRAVITY", "Slab", "SlabMatrices", "load_slab", "slab_designs", "slab
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
 
+MOST_DOFS = 5000  # of a slab: its matrices are full
 THIN = 0.1
 """Largest thickness over length or width of a thin plate (the source paper, section 2.1.2)."""
 
@@ -53,12 +55,12 @@ class Slab(Params):
 
     name: str = "slab"
     source: str = ""
-    length: Annotated[float, Q("m", gt=0.0)]
+    length: Annotated[float, Q("m", gt=0.0, le=200.0)]
     width: Annotated[float, Q("m", gt=0.0)]
     thickness: Annotated[float, Q("m", gt=0.0)]
     gap: Annotated[float, Q("m", ge=0.0)]
-    fastening_pitch: Annotated[float, Q("m", gt=0.0)]
-    fastenings: Annotated[int, Q("-", ge=1)]
+    fastening_pitch: Annotated[float, Q("m", ge=0.1, le=10.0)]
+    fastenings: Annotated[int, Q("-", ge=1, le=1000)]
     E: Annotated[float, Q("N/m^2", gt=0.0)]
     nu: Annotated[float, Q("-", ge=0.0, lt=0.5)]
     rho: Annotated[float, Q("kg/m^3", gt=0.0)]
@@ -88,6 +90,14 @@ class Slab(Params):
             )
         if known["fastening_pitch"] <= known["gap"]:
             raise ValueError("the outer seats, fastening_pitch / 2 from the joint's middle, must lie on the slab")
+        return value
+
+    @field_validator("elements_y")
+    @classmethod
+    def _is_not_too_fine(cls, value: int, info: ValidationInfo) -> int:
+        dofs = 3 * (info.data.get("elements_x", 1) + 1) * (value + 1)
+        if dofs > MOST_DOFS:
+            raise ValueError(f"gives the slab {dofs} degrees of freedom with elements_x; must be at most {MOST_DOFS}")
         return value
 
     @field_validator("seat_half_spacing")
@@ -233,11 +243,11 @@ def _build(slab: Slab, mortar: Mortar, groups: list[list[MortarVoid]]) -> list[S
     """One design for each group of voids."""
     elements = (slab.elements_x, slab.elements_y)
     points, weight = _quadrature(slab)
-    table = _tabulate(slab, points)
+    table = tabulate_shapes(slab, points)
     factor = np.stack([bed_factors(slab.length, slab.width, elements, voids) for voids in groups])
-    index = _element_dofs(slab)
+    index = element_dofs(slab)
     stiffness, mass, bed = _assemble(slab, table, weight, factor)
-    seat_index, seat_w, seat_slope, seat_x = _seats(slab, index)
+    seat_index, seat_w, seat_slope, seat_x = _seats(slab)
     designs = []
     for d in range(len(groups)):
         area = bed[d].copy()
@@ -279,23 +289,6 @@ def _quadrature(slab: Slab) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return points, np.outer(w, w).ravel() * area / 4.0
 
 
-def _tabulate(slab: Slab, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Shapes and derivatives at points of an element, shape (points, 6, 12) (see ``tabulate_shapes``)."""
-    table = np.zeros((len(points), 6, 12))
-    half = slab.length / (2.0 * slab.elements_x), slab.width / (2.0 * slab.elements_y)
-    plate.tabulate_shapes(*half, np.ascontiguousarray(points), table)
-    return table
-
-
-def _element_dofs(slab: Slab) -> NDArray[np.int32]:
-    """DOFs of every element, shape (n_el, 12)."""
-    ex, ey = np.divmod(np.arange(slab.elements_x * slab.elements_y), slab.elements_y)
-    corner = ex * (slab.elements_y + 1) + ey
-    nodes = corner[:, None] + np.array([0, 1, slab.elements_y + 1, slab.elements_y + 2])
-    dofs: NDArray[np.int32] = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 12).astype(np.int32)
-    return dofs
-
-
 def _assemble(
     slab: Slab, table: NDArray[np.float64], weight: NDArray[np.float64], factor: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -325,24 +318,15 @@ def _lateral_bed(
 
 
 def _seats(
-    slab: Slab, index: NDArray[np.int32]
+    slab: Slab,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """DOFs, w row, dw/dy row and place of every seat; seat j is (j + 1/2) d past the joint's middle."""
     seat_x = np.arange(0.5, slab.fastenings, dtype=np.float64) * slab.fastening_pitch - slab.pitch / 2.0
     seat_y = slab.seat_half_spacing * np.array([-1.0, 1.0])
-    ex, xi = _locate(seat_x, slab.length, slab.elements_x)
-    ey, eta = _locate(seat_y, slab.width, slab.elements_y)
-    points = np.stack(np.meshgrid(xi, eta, indexing="ij"), axis=-1)
-    table = _tabulate(slab, points.reshape(-1, 2)).reshape(slab.fastenings, 2, 6, 12)
-    seat_index: NDArray[np.int32] = index[ex[:, None] * slab.elements_y + ey]
-    return seat_index, table[:, :, 0].copy(), table[:, :, 2].copy(), seat_x
-
-
-def _locate(place: NDArray[np.float64], size: float, elements: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Element and local coordinate (-1...1) of places measured from the centre of a row of elements."""
-    along = (place / size + 0.5) * elements
-    element: NDArray[np.int64] = np.clip(along.astype(np.int64), 0, elements - 1)
-    return element, 2.0 * (along - element) - 1.0
+    x, y = np.meshgrid(seat_x, seat_y, indexing="ij")
+    index, table = shapes_at(slab, x.ravel(), y.ravel())
+    shape = (slab.fastenings, 2, 12)
+    return index.reshape(shape), table[:, W].reshape(shape), table[:, WY].reshape(shape), seat_x
 
 
 def _weight_pressure(

@@ -1,0 +1,121 @@
+"""Rail and slab as the train bends them: snapshots all along the window."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.groups import Block
+from tiengine.kernels import layout as at
+from tiengine.plate_shapes import W, element_dofs, locate, tabulate_shapes
+from tiengine.slab import Slab
+from tiengine.stepper import Stepper
+
+__all__ = ["Deflection", "window_points"]
+
+Reals = NDArray[np.float64]
+
+POINT_SPACING = 0.25
+"""About the distance of the points [m]: two or three between neighbouring seats."""
+
+
+def window_points(length: float) -> Reals:
+    """Points of a window, from its rear end to its front end [m], shape (points,)."""
+    return np.linspace(0.0, length, round(length / POINT_SPACING) + 1)
+
+
+@dataclass(eq=False)
+class Deflection:
+    """Snapshots of one run.
+
+    Attributes:
+        stepper: What is watched.
+        every: Steps from one to the next.
+        steps: Steps so far.
+    """
+
+    stepper: Stepper
+    every: int
+    steps: int = 0
+
+    def __post_init__(self) -> None:
+        """Shapes of the rails at the points, and of the slabs under them as polynomials of x."""
+        model = self.stepper.model
+        slab = model.given.slab
+        self._points = window_points(model.given.length)
+        self._rail_shape = model.window.shape(self._points).T
+        self._slab_dofs = element_dofs(slab).reshape(slab.elements_x, slab.elements_y, 12)
+        self._under_rails = [_cubic_along(slab, side * slab.seat_half_spacing) for side in (-1.0, 1.0)]
+        self._snapshots: list[tuple[int, Reals]] = []
+
+    @property
+    def point_offset(self) -> Reals:
+        """Points forward of the first vehicle's centre [m]."""
+        return self._points - self.stepper.model.centre_s
+
+    @property
+    def stage(self) -> str:
+        """What its part of a step is called."""
+        return "deflection"
+
+    def watch(self) -> None:
+        """Take a snapshot if it is time for one."""
+        self.steps += 1
+        if self.steps % self.every == 0:
+            self._snapshots.append((self.stepper.asked[0], np.stack([self._rail(), self._slab()])))
+
+    def blocks(self, time: Reals, position: Reals) -> list[Block]:
+        """Snapshots of the chunk whose steps end at the given times [s], with the train at the given chainages [m]."""
+        taken, self._snapshots = self._snapshots, []
+        steps = np.array([step for step, _ in taken], dtype=np.int64)
+        trains = int(self.stepper.model.dims[at.TRAINS])
+        none = np.empty((2, 0, trains, 2, len(self._points)))
+        rail, slab = np.concatenate([none, *(bent[:, None] for _, bent in taken)], axis=1)
+        return [Block(time[steps], position[steps], {"rail": rail[:, b], "slab": slab[:, b]}) for b in range(trains)]
+
+    def rest(self) -> list[Block]:
+        """Nothing is kept back."""
+        return []
+
+    def saved(self) -> dict[str, Reals]:
+        """What the coming snapshots depend on."""
+        return {"steps": np.array(float(self.steps))}
+
+    def restore(self, saved: Mapping[str, Reals]) -> None:
+        """Go on from what :meth:`saved` gave."""
+        self.steps = int(saved["steps"])
+
+    def _rail(self) -> Reals:
+        """Deflection of the rails [m], shape (B, 2, points)."""
+        rails = self.stepper.state.view(at.U, "vertical")[..., : self.stepper.model.given.modes]
+        return np.asarray(rails @ self._rail_shape)
+
+    def _slab(self) -> Reals:
+        """Deflection of the slabs under the rails [m], shape (B, 2, points); NaN where there is none."""
+        state, slab = self.stepper.state, self.stepper.model.given.slab
+        chainage = self.stepper.chunk.clock[self.stepper.asked[0], at.POSITION] + self._points
+        number = np.floor(chainage / slab.pitch).astype(np.int64)
+        x = chainage - (number + 0.5) * slab.pitch
+        motion = state.view(at.U, "slabs")
+        slots = motion.shape[1]
+        there = np.flatnonzero((np.abs(x) <= slab.length / 2.0) & (number < state.first_slab + slots))
+        found = np.full((len(motion), 2, len(x)), np.nan)
+        ex, xi = locate(x[there], slab.length, slab.elements_x)
+        for side, (ey, cubic) in enumerate(self._under_rails):
+            at_points = motion[:, (number[there] % slots)[:, None], self._slab_dofs[ex, ey]]
+            found[:, side, there] = np.einsum("bni,ni->bn", at_points, np.vander(xi, 4) @ cubic)
+        return found
+
+
+def _cubic_along(slab: Slab, y: float) -> tuple[int, Reals]:
+    """The line y [m] through an element: its number across the slab, and the shapes of w along it.
+
+    They are cubics of the local coordinate xi; coefficients of xi^3, xi^2, xi, 1 of each shape, shape (4, 12).
+    """
+    ey, eta = locate(np.array([y]), slab.width, slab.elements_y)
+    xi = np.array([-1.0, -1.0 / 3.0, 1.0 / 3.0, 1.0])
+    shapes = tabulate_shapes(slab, np.stack([xi, np.full(4, eta[0])], axis=1))[:, W]
+    return int(ey[0]), np.asarray(np.linalg.solve(np.vander(xi, 4), shapes), np.float64)

@@ -1,0 +1,224 @@
+"""What gauges see: the motion of a place of rail or slab, the force of a fastening, while the window is over them.
+
+The rail's fields are those of the window, w(s, t) = sum q_i(t) phi_i(s) with s = x - X(t). At a fixed x the rate is
+D = d/dt - V d/ds, so that with V = dX/dt and a = dV/dt
+
+    w = q phi        Dw = q' phi - V q phi,s        D^2 w = q'' phi - 2 V q' phi,s + V^2 q phi,ss - a q phi,s
+
+where primes on q are rates at constant s. Slabs stand still: their rates are those of their coordinates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.channels import GAUGE_FORCE, GAUGE_MOTION
+from tiengine.envelopes import watched_seats
+from tiengine.gauges import Gauge, nearest_seat, slab_under
+from tiengine.groups import Block
+from tiengine.kernels import layout as at
+from tiengine.model import Model
+from tiengine.plate_shapes import W, shapes_at
+from tiengine.state import State
+from tiengine.stepper import Stepper
+
+__all__ = ["GaugeSamples", "gauge_samples"]
+
+Reals = NDArray[np.float64]
+
+ROWS = (at.U, at.V, at.A)
+SIDES = {"left": 0, "right": 1}
+
+
+class Place(Protocol):
+    """What is watched."""
+
+    def read(self, X: float, V: float, V_rate: float) -> Reals | None:
+        """Its channels, shape (channels, B, ...), or None if it lies outside the window.
+
+        Args:
+            X: Chainage of the window's rear end [m].
+            V: Speed [m/s].
+            V_rate: Its rate [m/s^2].
+        """
+
+
+@dataclass(eq=False)
+class RailPlace:
+    """A place of a rail.
+
+    Attributes:
+        model, state: What is watched.
+        chainage: Of the place [m].
+        side: 0 left, 1 right.
+    """
+
+    model: Model
+    state: State
+    chainage: float
+    side: int
+
+    def __post_init__(self) -> None:
+        """Views of v and w: displacement, rate, second rate, each (B, N)."""
+        n = self.model.given.modes
+        self._fields = [
+            [self.state.view(row, block)[:, self.side, :n] for row in ROWS] for block in ("lateral", "vertical")
+        ]
+        self._k = self.model.window.wave_numbers
+
+    def read(self, X: float, V: float, V_rate: float) -> Reals | None:
+        """Displacement, velocity, acceleration to the right and down, shape (3, B, 2)."""
+        s = self.chainage - X
+        if not 0.0 <= s <= self.model.given.length:
+            return None
+        sine, cosine = np.sin(self._k * s), np.cos(self._k * s)
+        shapes = np.stack([sine, self._k * cosine, -(self._k**2) * sine], axis=1)
+        found = np.empty((3, len(self.state.design), 2))
+        for direction, rows in enumerate(self._fields):
+            (u, u_s, u_ss), (v, v_s, _), (a, *_) = ((row @ shapes).T for row in rows)
+            found[0, :, direction] = u
+            found[1, :, direction] = v - V * u_s
+            found[2, :, direction] = a - 2.0 * V * v_s + V**2 * u_ss - V_rate * u_s
+        return found
+
+
+@dataclass(eq=False)
+class SlabPlace:
+    """A place of a slab.
+
+    Attributes:
+        model, state: What is watched.
+        chainage: Of the place [m].
+        y: From the centre line, to the right [m].
+    """
+
+    model: Model
+    state: State
+    chainage: float
+    y: float
+
+    def __post_init__(self) -> None:
+        """Shapes at the place."""
+        slab = self.model.given.slab
+        self._slab, self._x = slab_under(self.chainage, slab)
+        index, table = shapes_at(slab, np.array([self._x]), np.array([self.y]))
+        self._index, self._shape = index[0], table[0, W]
+        slot = self._slab % self.model.given.slots
+        self._motion = [self.state.view(row, "slabs")[:, slot] for row in ROWS]
+
+    def read(self, X: float, V: float, V_rate: float) -> Reals | None:
+        """Displacement, velocity, acceleration to the right and down, shape (3, B, 2)."""
+        first = self.state.first_slab
+        inside = 0.0 <= self.chainage - X <= self.model.given.length
+        if not (inside and first <= self._slab < first + self.model.given.slots):
+            return None
+        found = np.empty((3, len(self.state.design), 2))
+        for kind, motion in enumerate(self._motion):
+            found[kind, :, 0] = motion[:, -2] + self._x * motion[:, -1]  # rigid in its plane
+            found[kind, :, 1] = motion[:, self._index] @ self._shape
+        return found
+
+
+@dataclass(eq=False)
+class SeatPlace:
+    """A fastening.
+
+    Attributes:
+        state: What is watched.
+        seat: Its index.
+        side: 0 left, 1 right.
+        places: First and end of the window's places where forces are those of fastenings alone.
+    """
+
+    state: State
+    seat: int
+    side: int
+    places: tuple[int, int]
+
+    def read(self, X: float, V: float, V_rate: float) -> Reals | None:
+        """Force of the rail on it, down and to the right, shape (2, B)."""
+        place = self.seat - self.state.first_seat
+        if not self.places[0] <= place < self.places[1]:
+            return None
+        return self.state.seat_force[:, self.side, :2, place].T.copy()
+
+
+@dataclass(eq=False)
+class GaugeSamples:
+    """Samples of one gauge, at the wheels' interval.
+
+    Attributes:
+        stepper: What is watched.
+        place: Where.
+        channels: Names of what is read there.
+        empty: No samples, shape (0, channels, B, ...).
+    """
+
+    stepper: Stepper
+    place: Place
+    channels: tuple[str, ...]
+    empty: Reals
+    _steps: list[int] = field(default_factory=list)
+    _values: list[Reals] = field(default_factory=list)
+
+    @property
+    def stage(self) -> str:
+        """What its part of a step is called."""
+        return "gauges"
+
+    def watch(self) -> None:
+        """Read, if the step is one that the wheels are asked for."""
+        step, row, _ = self.stepper.asked
+        if row < 0:
+            return
+        X, V, V_rate = self.stepper.chunk.clock[step, :3].tolist()
+        values = self.place.read(X, V, V_rate)
+        if values is not None:
+            self._steps.append(step)
+            self._values.append(values)
+
+    def blocks(self, time: Reals, position: Reals) -> list[Block]:
+        """Samples of the chunk whose steps end at the given times [s], with the train at the given chainages [m]."""
+        steps, values = np.array(self._steps, dtype=np.int64), np.array(self._values) if self._values else self.empty
+        self._steps.clear()
+        self._values.clear()
+        return [
+            Block(time[steps], position[steps], {name: values[:, i, b] for i, name in enumerate(self.channels)})
+            for b in range(values.shape[2])
+        ]
+
+    def rest(self) -> list[Block]:
+        """Nothing is kept back."""
+        return []
+
+    def saved(self) -> dict[str, Reals]:
+        """Coming samples depend on nothing past."""
+        return {}
+
+    def restore(self, saved: Mapping[str, Reals]) -> None:
+        """Nothing to go on from."""
+
+
+def gauge_samples(gauge: Gauge, stepper: Stepper) -> GaugeSamples:
+    """The samples of a gauge of the scenario.
+
+    Args:
+        gauge: A checked gauge.
+        stepper: What it watches.
+    """
+    model, state = stepper.model, stepper.state
+    trains = len(state.design)
+    if gauge.on == "fastening":
+        seat = nearest_seat(gauge.chainage, model.given.slab)
+        place: Place = SeatPlace(state, seat, SIDES[gauge.side or "left"], watched_seats(model))
+        return GaugeSamples(stepper, place, tuple(GAUGE_FORCE), np.empty((0, 2, trains)))
+    if gauge.on == "rail":
+        place = RailPlace(model, state, gauge.chainage, SIDES[gauge.side or "left"])
+    else:
+        place = SlabPlace(model, state, gauge.chainage, gauge.y or 0.0)
+    return GaugeSamples(stepper, place, tuple(GAUGE_MOTION), np.empty((0, 3, trains, 2)))

@@ -1,0 +1,108 @@
+"""Gauges of a scenario: fixed places of rail, slab or fastening that a run watches while the window is over them.
+
+::
+
+    [[gauges]]
+    name = "left_rail"
+    on = "rail"
+    chainage = 101.4        # m
+    side = "left"           # rail and fastening; a slab has y instead, from the centre line to the right [m]
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from tiengine.quantity import InputError, Params, Q
+from tiengine.slab import Slab
+
+__all__ = ["Gauge", "check_gauges", "nearest_seat", "slab_under"]
+
+NAME = re.compile(r"[A-Za-z0-9_-]+")
+
+
+class Gauge(Params):
+    """One place. On a fastening it is that of the seat nearest to the chainage.
+
+    Attributes:
+        name: Its group in the result is gauges/NAME; letters, digits, _ and -.
+        on: What it watches.
+        chainage: Where it stands; on a slab not in a joint.
+        side: Of rail and fastening.
+        y: Of a slab, from the centre line, positive to the right.
+    """
+
+    name: Annotated[str, Field(max_length=100)]
+    on: Literal["rail", "slab", "fastening"]
+    chainage: Annotated[float, Q("m", ge=0)]
+    side: Literal["left", "right"] | None = None
+    y: Annotated[float | None, Field(allow_inf_nan=False, json_schema_extra={"unit": "m"})] = None
+
+    @field_validator("name")
+    @classmethod
+    def _is_plain(cls, value: str) -> str:
+        if not NAME.fullmatch(value):
+            raise ValueError("must be made of letters, digits, _ and -")
+        return value
+
+
+def nearest_seat(chainage: float, slab: Slab) -> int:
+    """Index of the seat nearest to a chainage [m]; seat j stands at (j + 1/2) d."""
+    return int(np.floor(chainage / slab.fastening_pitch))
+
+
+def slab_under(chainage: float, slab: Slab) -> tuple[int, float]:
+    """Index of the slab over which a chainage lies, and the place from its centre [m], beyond its ends in a joint."""
+    index = int(np.floor(chainage / slab.pitch))
+    return index, chainage - (index + 0.5) * slab.pitch
+
+
+def check_gauges(gauges: Sequence[Gauge], *, begin: float, end: float, slab: Slab) -> None:
+    """Refuse gauges that the run never meets, that stand nowhere, or that share a name.
+
+    Args:
+        gauges: Of the scenario.
+        begin: Chainage of the window's rear end at the start of the run [m].
+        end: Chainage of its front end at the end of the run [m].
+        slab: Gives the pitches of seats and slabs and a slab's size.
+
+    Raises:
+        InputError: Names the entry, its value and the rule.
+    """
+    names = [gauge.name for gauge in gauges]
+    for i, gauge in enumerate(gauges):
+        where = f"gauges[{i}]"
+        if gauge.name in names[:i]:
+            raise InputError(f"{where}.name = {gauge.name!r}: gauges[{names.index(gauge.name)}] has this name already")
+        if not begin <= gauge.chainage <= end:
+            raise InputError(
+                f"{where}.chainage = {gauge.chainage:g}: must be between {begin:g} and {end:g} m, where the window goes"
+            )
+        if gauge.on == "slab":
+            _check_slab_gauge(where, gauge, slab)
+        elif gauge.side is None:
+            raise InputError(f"{where}.side: missing; a gauge on a {gauge.on} needs 'left' or 'right'")
+        elif gauge.y is not None:
+            raise InputError(f"{where}.y = {gauge.y:g}: only a gauge on a slab has it")
+
+
+def _check_slab_gauge(where: str, gauge: Gauge, slab: Slab) -> None:
+    """Rules of a gauge on a slab."""
+    if gauge.side is not None:
+        raise InputError(f"{where}.side = {gauge.side!r}: a gauge on a slab has y instead")
+    if gauge.y is None:
+        raise InputError(f"{where}.y: missing; a gauge on a slab needs its place from the centre line in m")
+    if abs(gauge.y) > slab.width / 2.0:
+        raise InputError(f"{where}.y = {gauge.y:g}: must be within half the slab's width, {slab.width / 2.0:g} m")
+    index, x = slab_under(gauge.chainage, slab)
+    if abs(x) > slab.length / 2.0:
+        ends = [(index + 0.5) * slab.pitch + half * slab.length for half in (-0.5, 0.5)]
+        raise InputError(
+            f"{where}.chainage = {gauge.chainage:g}: lies in a joint; must be on a slab,"
+            f" number {index} goes from {ends[0]:g} to {ends[1]:g} m"
+        )
