@@ -22,6 +22,7 @@ import tiengine
 from tiengine import results
 from tiengine.channels import WHEEL
 from tiengine.cli import main
+from tiengine.events import RunStoppedError
 from tiengine.presets import KINDS, preset_names
 from tiengine.scenario import to_toml
 from tiengine.writer import GroupSpec, TrainLabels, Writer
@@ -36,7 +37,7 @@ def fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
     module.calls = []
     module.failure = None
 
-    def run(scenario, output=None, *, force=False, progress=None, workers=None):
+    def run(scenario, output=None, *, force=False, progress=None, tell=None, workers=None, checkpoint=60.0, stop=None):
         module.calls.append(scenario)
         groups = {"wheel": GroupSpec.standard("wheel", tuple(WHEEL))}
         with Writer(output, to_toml(scenario), {}, [LABELS], groups, force=force) as writer:
@@ -45,7 +46,10 @@ def fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
                 progress(t, 1e-3)
             writer.append(0, "wheel", time, time, {name: np.zeros((10, 4, 2)) for name in WHEEL})
             if module.failure is not None:
+                writer.commit()
                 module.failure()
+                if stop():
+                    raise RunStoppedError("stopped after 0.001 of 0.002 s of simulated time")
             walls = {f"wall_time_{part}": 0.5 for part in ("import", "jit", "setup", "loop", "writing")}
             return writer.close(
                 {"status": "complete", "dofs": 943, "time_step": 1e-4, "real_time_factor": 1.5, **walls}
@@ -146,20 +150,25 @@ def test_existing_result_needs_force(fake):
     assert call("run", "paper", "--quiet", "--force").exit_code == 0
 
 
-def _interrupt() -> None:
-    raise KeyboardInterrupt
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "sigterm"])
+def test_interrupted_run_can_be_resumed(fake, tmp_path, number):
+    """One line says how; what was written stays."""
+    fake.failure = lambda: os.kill(os.getpid(), number)
+    result = call("run", "paper", "--quiet")
+    assert result.exit_code == 128 + number
+    assert result.stderr == "stopped after 0.001 of 0.002 s of simulated time; go on by: tiengine resume paper.h5\n"
 
 
-@pytest.mark.parametrize(
-    ("failure", "status"),
-    [(_interrupt, 1), (lambda: os.kill(os.getpid(), signal.SIGTERM), 128 + signal.SIGTERM)],
-    ids=["ctrl-c", "sigterm"],
-)
-def test_interrupted_run_leaves_nothing(fake, tmp_path, failure, status):
-    """Ctrl-C and a termination signal remove the half file."""
-    fake.failure = failure
-    assert call("run", "paper", "--quiet").exit_code == status
-    assert list(tmp_path.iterdir()) == []
+def test_second_interrupt_leaves_at_once(fake):
+    """Whoever is in a hurry loses what was not committed."""
+
+    def twice() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+        raise AssertionError("still here")
+
+    fake.failure = twice
+    assert call("run", "paper", "--quiet").exit_code == 128 + signal.SIGINT
 
 
 def test_list_names_every_preset():

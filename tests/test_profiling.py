@@ -13,7 +13,8 @@ from click.testing import CliRunner
 
 from tiengine import products, profiling, timed_loop
 from tiengine.cli import main
-from tiengine.events import RunFailedError
+from tiengine.events import Event, RunFailedError
+from tiengine.guards import Guard
 from tiengine.kernels import layout as at
 from tiengine.machine import cache_bytes
 from tiengine.products import count_products
@@ -270,6 +271,7 @@ def test_a_way_too_short_is_refused():
 
 def test_a_run_that_fails_is_told(monkeypatch):
     """A train that derails while it is measured."""
-    monkeypatch.setattr(timed_loop, "check_chunk", lambda *rest: {0: "derailed"})
-    with pytest.raises(RunFailedError, match="train 0: derailed"):
+    derailed = Event("derailment", 0.1, 20.0, 1, "left", "wheelset 1 left derailed", True)
+    monkeypatch.setattr(Guard, "look", lambda guard, step, position: guard._report(0, step, derailed))
+    with pytest.raises(RunFailedError, match="train 0: wheelset 1 left derailed"):
         profiling.profile("paper", steps=2)

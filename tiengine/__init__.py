@@ -1,6 +1,7 @@
 """tiengine: trains on slab track, in three dimensions, by a window of rail that moves with them.
 
-``run(scenario)`` simulates, ``open(path)`` reads a result file. Both are loaded when first used, so that importing the
+``run(scenario)`` simulates, ``resume(path)`` goes on with a run that was stopped, ``open(path)`` reads a result
+file. All are loaded when first used, so that importing the
 package costs nothing.
 """
 
@@ -14,16 +15,18 @@ if TYPE_CHECKING:
     from tiengine.results import Result as Result
     from tiengine.results import open as open
     from tiengine.scenario import load_scenario as load_scenario
+    from tiengine.simulate import resume as resume
     from tiengine.simulate import run as run
 
 __version__ = metadata.version("tiengine")
-__all__ = ["InputError", "Result", "load_scenario", "open", "run"]
+__all__ = ["InputError", "Result", "load_scenario", "open", "resume", "run"]
 
 _HOMES = {
     "InputError": "tiengine.quantity",
     "Result": "tiengine.results",
     "load_scenario": "tiengine.scenario",
     "open": "tiengine.results",
+    "resume": "tiengine.simulate",
     "run": "tiengine.simulate",
 }
 

@@ -16,20 +16,23 @@ __all__ = ["Column"]
 
 
 class Column:
-    """An open dataset, written at its end.
+    """An open dataset, written from some sample on.
 
     Attributes:
+        length: Samples written so far; the dataset may hold more, of a run that is being repeated.
         rest: Shape of one sample.
     """
 
-    def __init__(self, dataset: Any) -> None:
+    def __init__(self, dataset: Any, length: int = 0) -> None:
         """Take over a dataset of shape (n, ...) whose first axis may grow.
 
         Args:
             dataset: The h5py dataset.
+            length: Samples that stay as they are, at most n.
         """
         self._id = dataset.id
-        self._length = int(dataset.shape[0])
+        self._held = int(dataset.shape[0])
+        self.length = length
         self.rest: tuple[int, ...] = tuple(dataset.shape[1:])
 
     def extend(self, values: NDArray[Any]) -> None:
@@ -43,8 +46,10 @@ class Column:
         """
         if not len(values):
             return
-        start, self._length = self._length, self._length + len(values)
-        self._id.set_extent((self._length, *self.rest))
+        start, self.length = self.length, self.length + len(values)
+        if self.length > self._held:
+            self._id.set_extent((self.length, *self.rest))
+            self._held = self.length
         place = self._id.get_space()
         place.select_hyperslab((start, *(0 for _ in self.rest)), values.shape)
         self._id.write(h5py.h5s.create_simple(values.shape), place, np.ascontiguousarray(values))

@@ -1,61 +1,64 @@
-"""What can go wrong with the physics of a run, found chunk by chunk."""
+"""What can happen to a train on its way, and what the scenario makes of it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Annotated, Literal, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from tiengine.quantity import Params, Q
 
-from tiengine.kernels import layout as at
-from tiengine.model import Model
-from tiengine.stepper import Chunk
+__all__ = ["EVENT_KINDS", "Event", "Events", "RunFailedError", "RunStoppedError"]
 
-if TYPE_CHECKING:
-    from tiengine.recorder import Recorder
+EVENT_KINDS = ("derailment", "flange_climb", "wheel_lift", "track_end")
 
-__all__ = ["RunFailedError", "check_chunk"]
+Policy = Literal["stop", "record"]
 
-SIDES = ("left", "right")
+
+class Events(Params):
+    """What ends a train ("stop") and what is only written down ("record").
+
+    Attributes:
+        derailment: A wheel is beyond its profile on the flange side, where forces mean nothing any more.
+        flange_climb: The contact has passed the steepest part of the flange.
+        wheel_lift: A wheel carries nothing for ``wheel_lift_time``.
+        track_end: The leading wheel comes to the end of a measured track, smooth beyond it.
+    """
+
+    derailment: Policy = "stop"
+    flange_climb: Policy = "record"
+    wheel_lift: Policy = "record"
+    track_end: Policy = "record"
+    wheel_lift_time: Annotated[float, Q("s", "how long a wheel must be off its rail", ge=1e-3, le=10.0)] = 0.05
+
+
+class Event(NamedTuple):
+    """Something that happened to a train.
+
+    Attributes:
+        kind: One of ``EVENT_KINDS``, or ``"runaway"``.
+        time: When [s].
+        position: Chainage of the first vehicle's centre [m].
+        wheelset: From 1; 0 where it concerns none.
+        side: ``"left"``, ``"right"``, or nothing.
+        words: What happened.
+        stops: Whether it ends the train.
+    """
+
+    kind: str
+    time: float
+    position: float
+    wheelset: int
+    side: str
+    words: str
+    stops: bool
+
+    def __str__(self) -> str:
+        """One sentence."""
+        return f"{self.words} (t = {self.time:.4f} s, chainage {self.position:.2f} m)"
 
 
 class RunFailedError(RuntimeError):
     """A run that ended early: the message says where, when and why."""
 
 
-def check_chunk(
-    model: Model, chunk: Chunk, recorder: Recorder, first: int, position: NDArray[np.float64]
-) -> dict[int, str]:
-    """Look for numbers that ran away and for wheels that left the profile.
-
-    Args:
-        model: Constant data.
-        chunk: Recorded buffers.
-        recorder: Says which steps were recorded.
-        first: Number of the chunk's first step, from 1.
-        position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
-
-    Returns:
-        A sentence for each train that failed, by its place in the chunk.
-    """
-    steps = np.arange(first, first + len(position))
-    recorded = np.flatnonzero(steps % recorder.wheel_every == 0)
-    table = model.given.contact
-    limit = table.u_min + (table.values.shape[0] - 2) * table.du
-    failed = {}
-    for train, wheel in enumerate(chunk.wheel[:, : len(recorded)]):
-        force, shift = wheel[..., at.NORMAL_FORCE], wheel[..., at.RELATIVE_SHIFT]
-        wrong = ~np.isfinite(force) | ~np.isfinite(shift)
-        if wrong.any():
-            why = "numbers ran away; try a shorter time step or look at the irregularity"
-        else:
-            wrong = shift > limit
-            why = f"derailed: lateral shift beyond {limit * 1e3:.1f} mm on the flange side"
-        if wrong.any():
-            row, wheelset, side = np.argwhere(wrong)[0]
-            i = recorded[row]
-            failed[train] = (
-                f"wheelset {wheelset + 1} {SIDES[side]} {why}"
-                f" (t = {steps[i] * recorder.dt:.4f} s, chainage {position[i]:.2f} m)"
-            )
-    return failed
+class RunStoppedError(RuntimeError):
+    """A run that was asked to stop and can be resumed: the message says how far it came."""

@@ -5,23 +5,30 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tiengine.march import Advanced, Begun, Costs, Ended, Lost, Message
+from tiengine.checkpoint import Checkpoint, checkpoint_path
+from tiengine.events import Event
 from tiengine.memory import peak_memory
-from tiengine.results import COMPLETE, Result
+from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
+from tiengine.quantity import InputError
+from tiengine.results import COMPLETE, RUNNING, Result
 from tiengine.scenario import Scenario
 from tiengine.writer import Writer
 
-__all__ = ["Gathering", "Progress"]
+__all__ = ["Gathering", "Progress", "Tell"]
 
 Progress = Callable[[float, float], None]
+Tell = Callable[[str], None]
 
-RUNNING = "running"
-ONLY_OF_TRAINS = ("wall_time_loop", "trains_together", "status")
+FLUSH_SECONDS = 5.0
+"""Wall time after which what was written is made permanent: a commit takes some 20 ms."""
+
+ONLY_OF_TRAINS = ("wall_time_loop", "trains_together", "status", "vehicles")
 
 
 class Gathering:
@@ -30,16 +37,33 @@ class Gathering:
     Attributes:
         failed: Why trains failed, by their number.
         refused: Trains whose scenario is to blame.
+        latest: Last checkpoint of every task on its way, by its number.
+        ended: Trains of which nothing more will come.
+        tell: Says a sentence to whoever runs this.
     """
 
-    def __init__(self, scenario: Scenario, writer: Writer, progress: Progress | None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        writer: Writer,
+        path: Path | None = None,
+        progress: Progress | None = None,
+        tell: Tell | None = None,
+    ) -> None:
         """Begin with nothing.
 
         Args:
             scenario: The whole ensemble.
             writer: The open file.
+            path: Where it is, for checkpoints beside it; None in memory.
             progress: Called with simulated and whole time [s], of all trains together.
+            tell: Called with a sentence for each event.
         """
+        self.latest: dict[int, Checkpoint] = {}
+        self.ended: set[int] = set()
+        self._path = path
+        self.tell: Tell = tell or (lambda words: None)
+        self._committed = time.perf_counter()
         self.failed: dict[int, str] = {}
         self.refused: set[int] = set()
         self._writer, self._progress = writer, progress
@@ -49,27 +73,56 @@ class Gathering:
         self._costs: list[Costs] = []
         self._writing = 0.0
 
+    def go_on(self, latest: Mapping[int, Checkpoint], workers: int) -> None:
+        """Take over what an earlier session has done.
+
+        Args:
+            latest: Checkpoints of tasks on their way, by their number.
+            workers: Processes that share the rest.
+        """
+        self.latest.update(latest)
+        loop = 0.0
+        for train, known in self._writer.facts().items():
+            self._facts[train] = known
+            self._simulated[train] = float(known.get("simulated_time", 0.0))
+            status = known.get("status", RUNNING)
+            if status not in (COMPLETE, RUNNING):
+                self._fail({train: str(status)})
+            if status != RUNNING:
+                self.ended.add(train)
+                loop += float(known.get("wall_time_loop", 0.0)) / int(known.get("trains_together", 1))
+        self._costs.append(Costs(0, 0.0, 0.0, loop / max(workers, 1), 0.0))
+
     def take(self, message: Message) -> None:
         """Write a message."""
         clock = time.perf_counter()
         match message:
-            case Begun(labels, facts):
-                for train, known in facts.items():
-                    self._writer.add(train, labels, known | {"status": RUNNING})
-                    self._facts[train] |= known
-            case Advanced(now, blocks, failed):
+            case Begun():
+                self._begin(message)
+            case Advanced(now, blocks, failed, events):
                 for train, block in blocks.items():
                     self._writer.write(train, block)
                     self._simulated[train] = now
+                self._note(events)
                 self._fail(failed)
-            case Ended(facts, costs):
+                if clock - self._committed >= FLUSH_SECONDS:
+                    self._commit()
+            case Saved(trains, checkpoint):
+                self._save(trains, checkpoint)
+            case Paused():
+                pass  # what it takes to go on has come before
+            case Ended(task, facts, costs):
                 self._costs.append(costs)
+                self.ended.update(facts)
                 for train, known in facts.items():
                     self._writer.describe(train, known | {"status": self.failed.get(train, COMPLETE)})
                     self._facts[train] |= known
+                self._commit()
+                self._forget(task)
             case Lost(trains, why, refused):
                 self._fail(dict.fromkeys(trains, why) | self.failed)
                 self.refused.update(trains if refused else ())
+                self.ended.update(trains)
                 for train in trains:
                     status = {"status": self.failed[train], "simulated_time": self._simulated[train]}
                     self._writer.add(train, None, status)
@@ -77,6 +130,16 @@ class Gathering:
         if self._progress is not None and isinstance(message, Advanced):
             done = sum(self._simulated.values())
             self._progress(done, max(sum(self._whole), done))
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether trains are left on their way."""
+        return len(self.ended) < len(self._facts)
+
+    @property
+    def simulated(self) -> tuple[float, float]:
+        """Simulated time so far and in all [s], of all trains together."""
+        return sum(self._simulated.values()), sum(self._whole)
 
     def close(self, started: dict[str, float], workers: int) -> Result:
         """Complete the file.
@@ -100,6 +163,47 @@ class Gathering:
         if len(self._facts) > 1:
             attributes |= {"trains": len(self._facts), "workers": workers}
         return self._writer.close(attributes)
+
+    def _begin(self, begun: Begun) -> None:
+        """Trains begin, or go on from their checkpoint."""
+        saved = self.latest.get(begun.task)
+        for train, known in begun.facts.items():
+            self._writer.add(train, begun.labels, known | {"status": RUNNING})
+            self._facts[train] |= known
+            if saved is not None:
+                self._writer.rewind(train, saved.facts["rows"][str(train)])
+
+    def _save(self, trains: Iterable[int], checkpoint: Checkpoint) -> None:
+        """The file first: a checkpoint never says more than the file holds."""
+        rows = {str(train): self._writer.rows(train) for train in trains}
+        for train in trains:
+            self._writer.describe(train, {"simulated_time": self._simulated[train]})
+        complete = Checkpoint(checkpoint.task, {**checkpoint.facts, "rows": rows}, checkpoint.arrays)
+        self._commit()
+        self.latest[checkpoint.task] = complete
+        if self._path is None:
+            return
+        try:
+            complete.write(self._path)
+        except OSError as error:
+            raise InputError(f"output = '{self._path}': its checkpoint cannot be written ({error})") from None
+
+    def _commit(self) -> None:
+        self._writer.commit()
+        self._committed = time.perf_counter()
+
+    def _forget(self, task: int) -> None:
+        """A task has ended: its checkpoint is of no more use."""
+        self.latest.pop(task, None)
+        if self._path is not None:
+            checkpoint_path(self._path, task).unlink(missing_ok=True)
+
+    def _note(self, events: Mapping[int, Sequence[Event]]) -> None:
+        for train, found in events.items():
+            self._writer.note(train, found)
+            of = f"train {train}: " if len(self._facts) > 1 else ""
+            for event in found:
+                self.tell(f"{of}{event}")
 
     def _fail(self, failed: dict[int, str]) -> None:
         """Mark trains; nothing more will come of them."""

@@ -7,11 +7,12 @@ z = z_v + sigma b_i theta and y = y_a + sigma g/2, b_i = 0.75 m.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from tiengine.given_track import (
     FunctionTrack,
@@ -58,31 +59,34 @@ _MOST_BANDWIDTH = 1e4  # longest over shortest wave; a block then takes 40 MB
 class IrregularityParams(Params):
     """Which irregularity a track has; a ``file`` takes the place of the ``spectrum``.
 
-    A file's columns and the keys ``file_...`` are explained in :mod:`tiengine.track_files`; ``file_band_pass`` keeps
-    the waves from ``wavelength_min`` to ``wavelength_max`` only.
+    A file's columns and the keys ``file_...`` are explained in docs/files.md.
 
     ``short_wave`` adds the ISO 3095 limit to the vertical of each rail, from its longest band (0.45 m) or
     ``wavelength_min``, whichever is shorter, down to ``short_wave_min``.
     """
 
-    spectrum: str = "german_low"
+    spectrum: Annotated[
+        str, Field(description='preset of kind irregularity (`tiengine list irregularity`), or "none"')
+    ] = "german_low"
     seed: Annotated[int, Q("-", "names the realisation", ge=0, le=2**63 - 1)] = 1
     wavelength_min: Annotated[float, Q("m", "shortest wave of the spectrum", gt=0, le=1e4)] = 1.0
     wavelength_max: Annotated[float, Q("m", "longest wave of the spectrum", gt=0, le=1e4, validate_default=True)] = (
         120.0
     )
-    two_sided: bool = False
+    two_sided: Annotated[bool, Field(description="the spectrum's constants are those of a two-sided density")] = False
     scale: Annotated[float, Q("-", "factor on all amplitudes", ge=0)] = 1.0
     percentile: Annotated[float | None, Q("-", "of the Chinese spectrum; 0.632: mean", gt=0, lt=1)] = None
-    short_wave: bool = False
+    short_wave: Annotated[bool, Field(description="adds the rail roughness of ISO 3095, see above")] = False
     short_wave_min: Annotated[float, Q("m", "shortest wave of the rail roughness", gt=0, validate_default=True)] = 0.08
     taper: Annotated[float, Q("m", "length over which the irregularity begins", gt=0)] = 30.0
-    file: str | None = None
-    file_unit: Literal["m", "mm"] = "m"
+    file: Annotated[
+        str | None, Field(description="measured track as CSV (docs/files.md), relative to the scenario")
+    ] = None
+    file_unit: Annotated[Literal["m", "mm"], Field(description="of columns that state none")] = "m"
     file_start: Annotated[float | None, Q("m", "mileage of the file at chainage zero")] = None
-    file_reverse: bool = False
-    file_vertical_up: bool = False
-    file_band_pass: bool = False
+    file_reverse: Annotated[bool, Field(description="the train runs through the rows from last to first")] = False
+    file_vertical_up: Annotated[bool, Field(description="verticals are up positive in the file")] = False
+    file_band_pass: Annotated[bool, Field(description="keeps waves from wavelength_min to wavelength_max only")] = False
 
     @field_validator("spectrum")
     @classmethod
@@ -163,7 +167,14 @@ def _from_rails(z: Reals) -> Reals:
 class Irregularity:
     """Irregularity at any chainage; build it with :func:`make_irregularity` or :func:`from_function`."""
 
-    def __init__(self, parts: list[_Track], taper_start: float, taper: float, shortest: float) -> None:
+    def __init__(
+        self,
+        parts: list[_Track],
+        taper_start: float,
+        taper: float,
+        shortest: float,
+        reach: tuple[float, float] = (-np.inf, np.inf),
+    ) -> None:
         """Add up parts.
 
         Args:
@@ -171,7 +182,9 @@ class Irregularity:
             taper_start: Chainage before which the track is smooth [m].
             taper: Length over which the irregularity begins [m].
             shortest: Shortest wavelength of the parts [m]; infinite where not known.
+            reach: Chainages where a measured track begins and ends [m].
         """
+        self.start, self.end = reach
         self._parts = parts
         self.taper_start, self.taper, self.shortest_wavelength = taper_start, taper, shortest
 
@@ -233,7 +246,7 @@ def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregul
         InputError: The file breaks a rule.
     """
     parts: list[_Track] = []
-    shortest = params.shortest_wavelength
+    shortest, reach = params.shortest_wavelength, (-np.inf, np.inf)
     if params.file is not None:
         measured = MeasuredTrack(_measured_series(params, params.file), params.taper)
         if measured.end <= taper_start:
@@ -242,6 +255,7 @@ def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregul
                 " begins; set file_start to the mileage of chainage zero"
             )
         parts.append(measured)
+        reach = (measured.start, measured.end)
         shortest = min(shortest, max(measured.shortest, params.wavelength_min if params.file_band_pass else 0.0))
     elif params.spectrum != "none":
         band = (params.wavelength_min, params.wavelength_max)
@@ -255,7 +269,25 @@ def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregul
         band = (params.short_wave_min, params.short_wave_max)
         rails = noise_spline(params.seed, (4, 5), (felt, felt), band, shortest_block=_ROUGHNESS_BLOCK)
         parts.append(_Roughness(rails))
-    return Irregularity(parts, taper_start, params.taper, shortest)
+    return Irregularity(parts, taper_start, params.taper, shortest, reach)
+
+
+def check_reach(tracks: Iterable[Irregularity], end: float) -> None:
+    """Refuse a measured track that the train never comes to.
+
+    Args:
+        tracks: Irregularity of each train.
+        end: Chainage of the leading wheel at the end of the way [m].
+
+    Raises:
+        InputError: A track begins behind it.
+    """
+    for track in tracks:
+        if track.start >= end:
+            raise InputError(
+                f"irregularity.file: begins at chainage {track.start:g} m: must be before the end of the way, {end:g}"
+                " m; set file_start to the mileage of chainage zero"
+            )
 
 
 def _measured_series(params: IrregularityParams, file: str) -> Reals:

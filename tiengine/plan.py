@@ -25,11 +25,13 @@ class Task:
     """Trains that are advanced together.
 
     Attributes:
+        number: Of the task, from 0.
         scenario: The first train's; the others differ in their irregularity alone.
         trains: Numbers of the trains in the ensemble.
         tracks: Irregularity of every train, then of those that fill up the task.
     """
 
+    number: int
     scenario: Scenario
     trains: tuple[int, ...]
     tracks: tuple[IrregularityParams, ...]
@@ -54,18 +56,23 @@ def plan(scenario: Scenario, together: int = TRAINS_TOGETHER) -> tuple[Task, ...
     groups: dict[str, list[int]] = {}
     for i, train in enumerate(members):
         groups.setdefault(_shared(train), []).append(i)
-    return tuple(task for group in groups.values() for task in _tasks(members, group, together))
+    tasks: list[Task] = []
+    for group in groups.values():
+        tasks += _tasks(members, group, together, len(tasks))
+    return tuple(tasks)
 
 
-def _tasks(members: tuple[Scenario, ...], group: list[int], together: int) -> list[Task]:
-    """A group in tasks of equal size."""
+def _tasks(members: tuple[Scenario, ...], group: list[int], together: int, number: int) -> list[Task]:
+    """A group in tasks of equal size, counted from ``number``."""
     count = math.ceil(len(group) / together)
     size = math.ceil(len(group) / count)
-    tasks = []
+    tasks: list[Task] = []
     for first in range(0, len(group), size):
         trains = tuple(group[first : first + size])
         filled = (*trains, *(trains[-1],) * (size - len(trains)))
-        tasks.append(Task(members[trains[0]], trains, tuple(members[i].irregularity for i in filled)))
+        tasks.append(
+            Task(number + len(tasks), members[trains[0]], trains, tuple(members[i].irregularity for i in filled))
+        )
     return tasks
 
 

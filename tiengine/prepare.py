@@ -11,7 +11,8 @@ from tiengine.integrator import Newmark
 from tiengine.irregularity import IrregularityParams, make_irregularity
 from tiengine.model import Ingredients, Model, build_model
 from tiengine.quantity import InputError
-from tiengine.scenario import Output, Scenario, check_wavelength, load_scenario, to_toml
+from tiengine.scenario import Scenario, check_wavelength, load_scenario, to_toml
+from tiengine.sections import Output
 from tiengine.setup import ingredients
 from tiengine.stability import TOLERATED_GROWTH, energy_growth
 from tiengine.state import State
@@ -75,6 +76,7 @@ def _without_speed(scenario: Scenario) -> str:
         "numerics": scenario.numerics.model_copy(update={"time_step": "auto"}),
         "irregularity": IrregularityParams(spectrum="none"),
         "output": Output(),
+        "gauges": (),
     }
     return to_toml(scenario.model_copy(update=update))
 

@@ -29,6 +29,7 @@ from tiengine.roofs import Roofs, measure_roofs
 from tiengine.scenario import Scenario, load_scenario, to_toml
 from tiengine.stage_split import contact_us, suspension_us
 from tiengine.timed_loop import REST, StageTimers, TimedLoop, Times, shown
+from tiengine.trackside import trackside_groups
 from tiengine.writer import Writer
 
 __all__ = ["array_bytes", "profile"]
@@ -39,8 +40,8 @@ HOME = {"suspension": "fastening kernel", "contact": "fastening kernel"}
 """Parts without a stage of their own, and the stage from whose time their estimate is taken off."""
 
 ORDER = ("window and seats", "irregularity", "predictors and correctors", "linear forces", "motion at the seats",
-         "fastening kernel", "suspension", "contact", "mortar", "implicit solve", "recording", "checks",
-         "writing")  # fmt: skip
+         "fastening kernel", "suspension", "contact", "mortar", "implicit solve", "recording", "envelopes",
+         "gauges", "deflection", "checks", "writing")  # fmt: skip
 """Rows of the table; stages unknown here come after."""
 
 
@@ -74,7 +75,7 @@ def profile(
         loop, wall = _set_up(
             _task(scenario, trains), importing, Path(stack.enter_context(TemporaryDirectory(prefix="tiengine-")))
         )
-        stack.callback(loop.writer.discard)
+        stack.callback(loop.writer.leave)
         return _measure(loop, wall, max(2, round(seconds / loop.recorder.dt)) if steps is None else steps)
 
 
@@ -95,7 +96,7 @@ def _task(scenario: Scenario, trains: int | None) -> Task:
         return task
     own = task.tracks[0]
     tracks = tuple(own.model_copy(update={"seed": own.seed + b}) for b in range(trains))
-    return Task(task.scenario, tuple(range(trains)), tracks)
+    return Task(0, task.scenario, tuple(range(trains)), tracks)
 
 
 def _set_up(task: Task, importing: float, folder: Path) -> tuple[TimedLoop, Wall]:
@@ -103,12 +104,13 @@ def _set_up(task: Task, importing: float, folder: Path) -> tuple[TimedLoop, Wall
     started = time.perf_counter()
     scenario, run = task.scenario, Run.begin(task)
     model, recorder, stepper = run.model, run.recorder, run.stepper
-    labels = [recorder.labels(model.given.train, model.given.slots)] * task.size
+    groups = recorder.groups() | trackside_groups(scenario)
     precision = scenario.output.precision
-    writer = Writer(folder / "profile.h5", to_toml(scenario), {}, labels, recorder.groups(), precision)
+    writer = Writer(folder / "profile.h5", to_toml(scenario), {}, [run.labels] * task.size, groups, precision)
     first = scenario.rear + model.centre_s
     end = first + scenario.train.distance
-    loop = TimedLoop(scenario, stepper, StageTimers(stepper), recorder, writer, run.tracks, first, end)
+    timers = StageTimers(stepper)
+    loop = TimedLoop(scenario, stepper, timers, recorder, run.trackside, run.guard, writer, run.tracks, first, end)
     generation = float(impl.get_runtime().prog.get_total_compilation_time())
     setup = time.perf_counter() - started - run.jit
     return loop, Wall(import_s=importing, jit_s=run.jit, code_generation_s=generation, setup_s=setup)

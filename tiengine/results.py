@@ -1,12 +1,12 @@
 """Reading result files: lazily, as NumPy arrays.
 
-The files are plain HDF5 and open as well with
-``xarray.open_dataset(FILE, group="trains/000/wheel", engine="h5netcdf")``.
+The files are plain HDF5; docs/results.md says what they hold, and how to read them without this package.
 """
 
 from __future__ import annotations
 
-import tomllib
+import re
+import zlib
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -15,19 +15,36 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.file_lock import settle
+from tiengine.input_files import parse_toml
+from tiengine.journal import journal_of
 from tiengine.presets import nearest
 from tiengine.quantity import InputError
+from tiengine.result_layout import check_train, readable, unreadable
 
 if TYPE_CHECKING:
+    import xarray
+
     from tiengine.metrics import Metrics
     from tiengine.scenario import Scenario
 
-__all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "Result", "open"]
+__all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "RUNNING", "Result", "open"]
 
 FORMAT = "tiengine"
 FORMAT_VERSION = 1
 COMPLETE = "complete"
 """Status of a train that has run to the end of its way."""
+RUNNING = "running"
+"""Status of one that is on its way, or was when the program ended."""
+TRAIN = re.compile(r"trains/\d+(?=/|$)", flags=re.ASCII)
+LARGEST_SCENARIO = 100_000_000  # characters
+OPTIONAL = {
+    "seats": "output.envelopes = true",
+    "slabs": "output.envelopes = true",
+    "deflection": "output.deflection_interval, 0.1 for example,",
+    "gauges": "a table [[gauges]]",
+}
+"""Groups of a train that a run may do without, and what to set for them."""
 
 
 class Result:
@@ -46,6 +63,7 @@ class Result:
         """
         self._file = file
         self.name = name
+        self._checked: set[str] = set()
 
     def __enter__(self) -> Result:
         """The result itself."""
@@ -54,17 +72,31 @@ class Result:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the file."""
+        """Close the file; what HDF5 could not read in it becomes an InputError."""
         self.close()
+        if (words := unreadable(error, trace)) is not None:
+            raise InputError(f"{self.name}: {words}") from error
 
     def __getitem__(self, path: str) -> Any:
         """A dataset or group, as in ``result["trains/000/wheel/normal_force"][:1000]``; nothing is read yet.
 
         Raises:
-            InputError: There is nothing at that path; the message names the nearest.
+            InputError: There is nothing at that path; the message names the nearest, or the key that fills it. Or the
+                train is damaged.
         """
+        with readable(self.name):
+            return self._at(path)
+
+    def _at(self, path: str) -> Any:
+        if (found := TRAIN.match(path.strip("/"))) is not None and found[0] not in self._checked:
+            if found[0] in self._file:
+                check_train(self._file[found[0]], f"{self.name}: {found[0]}")
+            self._checked.add(found[0])
         if path in self._file:
             return self._file[path]
+        trains, train, group = (*path.strip("/").split("/"), "", "", "")[:3]
+        if group in OPTIONAL and f"{trains}/{train}" in self._file and f"{trains}/{train}/{group}" not in self._file:
+            raise InputError(f"{self.name}: no {group!r}; set {OPTIONAL[group]} in the scenario and run it again")
         known: list[str] = []
         self._file.visit(known.append)
         raise InputError(f"{self.name}: no {path!r}{nearest(path.strip('/'), known)}")
@@ -81,19 +113,33 @@ class Result:
     @property
     def attributes(self) -> dict[str, Any]:
         """Root attributes: versions, scenario, DOFs, step, wall times."""
-        return {key: _plain(value) for key, value in self._file.attrs.items()}
+        with readable(self.name):
+            return {key: _plain(value) for key, value in self._file.attrs.items()}
 
     @property
     def scenario_toml(self) -> str:
-        """The resolved scenario as text."""
-        return str(self._file.attrs["scenario"])
+        """The resolved scenario as text.
+
+        Raises:
+            InputError: It is missing, damaged, or too large.
+        """
+        with readable(self.name):
+            text = str(self._file.attrs["scenario"])
+            checksum = self._file.attrs.get("scenario_crc32")
+        if len(text) > LARGEST_SCENARIO:
+            raise InputError(
+                f"{self.name}: scenario: {len(text) / 1e6:g} MB, larger than {LARGEST_SCENARIO / 1e6:g} MB"
+            )
+        if checksum is not None and zlib.crc32(text.encode("utf-8", "surrogateescape")) != checksum:
+            raise InputError(f"{self.name}: scenario: damaged: its checksum is another one")
+        return text
 
     @property
     def scenario(self) -> Scenario:
         """The scenario that was run."""
         from tiengine.scenario import load_scenario  # Taichi comes with it: not for those who only read
 
-        return load_scenario(tomllib.loads(self.scenario_toml))
+        return load_scenario(parse_toml(self.scenario_toml, f"{self.name}: scenario"))
 
     def status(self, train: int = 0) -> str:
         """``"complete"``, or why the train failed.
@@ -104,10 +150,15 @@ class Result:
         return str(self.facts(train).get("status", self.attributes.get("status", "")))
 
     @property
+    def finished(self) -> bool:
+        """Whether the run has come to its end, well or not; one that has not can be resumed."""
+        return bool(self.attributes.get("status") != RUNNING)
+
+    @property
     def failures(self) -> dict[int, str]:
         """Why trains failed, by their index."""
         found = {train: self.status(train) for train in range(self.trains)}
-        return {train: why for train, why in found.items() if why != COMPLETE}
+        return {train: why for train, why in found.items() if why not in (COMPLETE, RUNNING)}
 
     def facts(self, train: int = 0) -> dict[str, Any]:
         """Attributes of one train: vehicles, seed, DOFs, step, status, simulated time.
@@ -118,7 +169,10 @@ class Result:
         Raises:
             InputError: There is no such train.
         """
-        return {key: _plain(value) for key, value in self[f"trains/{train:03d}"].attrs.items()}
+        with readable(self.name):
+            if (path := f"trains/{train:03d}") in self._file:  # not all of it is checked for its attributes
+                return {key: _plain(value) for key, value in self._file[path].attrs.items()}
+        return dict(self[path].attrs)  # says what is there instead
 
     def scenario_of(self, train: int) -> Scenario:
         """The scenario of one train of an ensemble, by itself.
@@ -132,16 +186,18 @@ class Result:
         """All of one group in memory.
 
         Args:
-            name: ``"wheel"``, ``"body"``, ``"irregularity"``.
+            name: ``"wheel"``, ``"seats"``, ``"gauges/bridge"``.
             train: Index of the train.
 
         Returns:
-            Arrays by name: ``time`` [s] (n,), ``position`` [m] (n,), labels, and channels (n, ...).
+            Arrays by name: ``time`` [s] (n,), ``position`` [m] (n,), labels, and channels (n, ...); ``seat`` or
+            ``slab`` (n,) and ``chainage`` [m] (n,) instead of times in the envelopes.
 
         Raises:
             InputError: There is no such train or group.
         """
-        return {key: _array(dataset) for key, dataset in self[f"trains/{train:03d}/{name}"].items()}
+        with readable(self.name):
+            return {key: _array(dataset) for key, dataset in self[f"trains/{train:03d}/{name}"].items()}
 
     def wheel(self, train: int = 0) -> dict[str, NDArray[Any]]:
         """Contact of every wheel; channels have shape (time, wheelset, side)."""
@@ -154,6 +210,39 @@ class Result:
     def irregularity(self, train: int = 0) -> dict[str, NDArray[Any]]:
         """Irregularity as felt at every wheel; channels have shape (time, wheelset, side)."""
         return self.group("irregularity", train)
+
+    def seats(self, train: int = 0) -> dict[str, NDArray[Any]]:
+        """Extremes of every fastening's forces; channels have shape (seat, side)."""
+        return self.group("seats", train)
+
+    def slabs(self, train: int = 0) -> dict[str, NDArray[Any]]:
+        """Extremes of every slab; channels have shape (slab,)."""
+        return self.group("slabs", train)
+
+    def deflection(self, train: int = 0) -> dict[str, NDArray[Any]]:
+        """Rail and slab all along the window; channels have shape (time, side, point)."""
+        return self.group("deflection", train)
+
+    def gauges(self, train: int = 0) -> dict[str, dict[str, NDArray[Any]]]:
+        """All gauges by name; channels have shape (time, direction) or, on a fastening, (time,)."""
+        return {name: self.group(f"gauges/{name}", train) for name in self[f"trains/{train:03d}/gauges"]}
+
+    def to_xarray(self, group: str = "wheel", train: int | None = 0) -> xarray.Dataset:
+        """One group as an xarray dataset with its coordinates, units and names.
+
+        Args:
+            group: ``"wheel"``, ``"body"``, ``"gauges/bridge"``.
+            train: Index of the train: channels are read when asked for, while this result is open. None stacks all
+                trains in memory, along the dimension ``train``.
+
+        Raises:
+            InputError: No such train or group, trains that cannot be stacked, or xarray is missing.
+        """
+        from tiengine.datasets import open_dataset, stacked_dataset  # xarray takes a second to import
+
+        if train is None:
+            return stacked_dataset(self, self._file, group)
+        return open_dataset(self, self._file, group, train)
 
     def metrics(self, train: int | None = None) -> Metrics:
         """Indices of the standards (docs/indices.md).
@@ -187,18 +276,35 @@ def open(path: Path | str) -> Result:
     """
     if not Path(path).is_file():
         raise InputError(f"{path}: no such file")
+    settle(Path(path))
     try:
         file = h5py.File(path, "r")
     except OSError:
+        if journal_of(Path(path)).exists():
+            raise InputError(
+                f"{path}: a crash interrupted its last commit; the journal beside it completes it as soon as"
+                " the file and its folder can be written to"
+            ) from None
         raise InputError(f"{path}: not a tiengine result (not an HDF5 file, or damaged)") from None
-    if file.attrs.get("format") != FORMAT:
+    try:
+        with readable(str(path)):
+            _check_header(file.attrs, path)
+    except InputError:
         file.close()
-        raise InputError(f"{path}: not a tiengine result (HDF5, but its attribute format is not {FORMAT!r})")
-    version = file.attrs.get("format_version")
-    if version != FORMAT_VERSION:
-        file.close()
-        raise InputError(f"{path}: format_version = {version}: this program reads {FORMAT_VERSION}")
+        raise
     return Result(file, str(path))
+
+
+def _check_header(attributes: Any, path: Path | str) -> None:
+    """Refuse what another program or another version of this one has written."""
+    given, version = _plain(attributes.get("format")), _plain(attributes.get("format_version"))
+    if not isinstance(given, str) or given != FORMAT:
+        raise InputError(f"{path}: not a tiengine result (HDF5, but its attribute format is not {FORMAT!r})")
+    if not isinstance(version, int) or version != FORMAT_VERSION:
+        raise InputError(
+            f"{path}: format_version = {version}: this program reads {FORMAT_VERSION}; read it by the version of"
+            f" tiengine that wrote it ({attributes.get('tiengine_version', 'unknown')}), or run its scenario anew"
+        )
 
 
 def _array(dataset: Any) -> NDArray[Any]:

@@ -4,127 +4,38 @@ A part (vehicle, rail, slab, fastening, profile) is given by the name of a prese
 (relative to the scenario's), or as a table; a table may start from a preset: ``{like = "ACE2021",
 vertical_stiffness = 5e7}``. Loading copies every preset used into ``presets``, so that the text written by
 :func:`to_toml` says all that was run and loads back equal wherever it is read.
-
-Speeds are in km/h at this edge only.
 """
 
 from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tomli_w
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
-from tiengine.channels import BODY, IRREGULARITY, WHEEL
-from tiengine.defects import FailedFastenings, MortarDefect, check_defects
+from tiengine.defects import check_defects
 from tiengine.ensemble import Ensemble
-from tiengine.fields import channel_names, check_speed, number_or
+from tiengine.events import Events
+from tiengine.gauges import Gauge, check_gauges
+from tiengine.input_files import to_tuples
 from tiengine.irregularity import IrregularityParams
 from tiengine.mortar import MortarVoid
 from tiengine.overrides import Overrides, apply_overrides
-from tiengine.parts import Part, Parts, build_parts, collect_presets
-from tiengine.presets import find_preset, load_toml, to_tuples
-from tiengine.quantity import InputError, Params, Q, build
-from tiengine.speed import SpeedProfile
+from tiengine.parts import Parts, build_parts, collect_presets
+from tiengine.presets import find_preset, load_toml, user_path
+from tiengine.quantity import InputError, Params, PlainName, Source, build
+from tiengine.sections import Contact, Numerics, Output, Track, Train
 
 __all__ = ["Scenario", "check_wavelength", "load_scenario", "to_toml"]
 
 WINDOW_MARGIN = 4.0  # m beyond the outer wheels, either end, of the window "auto", see Numerics
 WINDOW_MARGIN_LEAST = 2.0  # m: below this the window's fixed ends, or an absorbing zone, are felt by the outer wheels
+LONGEST_RUN = 1e6  # s: the longest way at 1 m/s
+LONGEST_WINDOW = 2000.0  # m
+MOST_MODES = 3000  # of each rail field: the matrices of a rail then take 2 GB
 STEPS_PER_WAVE = 8.0  # the shortest wave must be passed in no fewer steps (MODEL §6)
-
-
-class Train(Params):
-    """What runs and how fast.
-
-    ``start`` is the chainage of the first vehicle's centre at t = 0; "auto" puts the window's rear end at zero.
-    """
-
-    vehicles: Annotated[tuple[Part, ...], Field(min_length=1)]
-    coupler_pitch: float | tuple[float, ...] | None = Field(None, json_schema_extra={"unit": "m"})
-    speed_kmh: Annotated[float | tuple[tuple[float, float], ...], BeforeValidator(check_speed)]
-    distance: Annotated[float, Q("m", "way of the train", gt=0, le=1e6)]
-    start: Annotated[float | Literal["auto"], number_or("auto", "m", 0.0, 1e7)] = "auto"
-    wheel_profile: Part = "LMA"
-    series_springs: bool = False
-
-    @property
-    def speed(self) -> SpeedProfile:
-        """Speed [m/s] over the chainage of the first vehicle's centre [m]."""
-        if isinstance(self.speed_kmh, tuple):
-            return SpeedProfile.table(*zip(*((x, v / 3.6) for x, v in self.speed_kmh), strict=True))
-        return SpeedProfile.constant(self.speed_kmh / 3.6)
-
-
-class Track(Params):
-    """The track, its contact with the wheel, and its defects."""
-
-    rail: Part = "CHN60"
-    rail_profile: Part = "CHN60"
-    slab: Part = "CRTS_III"
-    fastening: Part = "ACE2021"
-    friction: Annotated[float, Q("-", "coefficient of friction", gt=0, le=1)] = 0.3
-    gauge: Annotated[float, Q("m", ge=0.6, le=2.0)] = 1.435
-    gauge_depth: Annotated[float, Q("m", "below the top of the rail, where gauge is measured", gt=0, le=0.03)] = 0.016
-    cant: Annotated[float, Q("-", "inward inclination of the rail", ge=0, le=0.1)] = 0.025
-    mortar_no_tension: bool = False
-    failed_fastenings: tuple[FailedFastenings, ...] = ()
-    mortar_voids: tuple[MortarDefect, ...] = ()
-
-
-class Contact(Params):
-    """How wheel and rail touch."""
-
-    hertz: Literal["exact", "zhai_worn", "zhai_cone"] = "exact"
-    smoothing: Annotated[float, Q("m", "Gaussian in the lateral shift", ge=0, le=2e-3)] = 1e-4
-    cross_level_rolls_rails: bool = True
-
-
-class Numerics(Params):
-    """How it is computed.
-
-    The defaults are the cheapest settings whose wheel forces are within 1 % of their peak from the converged ones for
-    99 % of the time (``validation/report/convergence.md``). Point supports excite the rail at multiples of the
-    seat-passing frequency; the j-th needs 2 j / 0.63 m modes a metre, so that errors fall in steps, and 6.5 lie just
-    beyond the second. They lend the wheels the static compliance of the modes left out. A window of 4 m beyond the
-    outer wheels (MODEL §1 names 8 m) changes forces by 0.04 % vertically and 0.2 % laterally, four decay lengths of a
-    rail on its fastenings. The source paper has 1.7 modes a metre and 8 m.
-
-    The blow that ends a wheel's flight sends waves of 1 to 3 kHz along the rail, at the speed of shear, 2030 m/s; the
-    window's pinned ends send them back. An ``absorbing_zone`` at either end, with springs and dampers from rail to
-    ground up to as strong as the fastenings', swallows most of them: with 6 m in a window of 36 m the largest echo,
-    0.27 % of the peak force, falls to 0.14 %. It must keep 2 m from the wheels, hence there is none in the default's
-    shorter window.
-    """
-
-    modes_per_metre: Annotated[float, Q("1/m", "trial functions per field and metre of window", ge=0.2, le=20)] = 6.5
-    window: Annotated[float | Literal["auto"], number_or("auto", "m", 1.0, 2000.0)] = "auto"
-    time_step: Annotated[float | Literal["auto"], number_or("auto", "s", 1e-6, 1e-3)] = "auto"
-    passes: Annotated[int, Q("-", "passes of the explicit half per step", ge=1, le=20)] = 2
-    start: Literal["equilibrium", "zero"] = "equilibrium"
-    mortar: Literal["implicit", "explicit"] = "implicit"
-    truncation: Literal["none", "local"] = "local"
-    absorbing_zone: Annotated[float, Q("m", "at either end of the window", ge=0)] = 0.0
-    slab_count: Literal["cover", "paper"] = "cover"
-    threads: Annotated[int, Q("-", "of Taichi's loop over trains; one train alone runs on one", ge=1, le=1024)] = 1
-
-    def modes(self, window: float) -> int:
-        """Trial functions of each rail field in a window of the given length [m]."""
-        return max(1, round(self.modes_per_metre * window))
-
-
-class Output(Params):
-    """What is written, and how often; intervals are rounded to whole steps."""
-
-    wheel_interval: Annotated[float | Literal["step"], number_or("step", "s", 1e-6, 10.0)] = "step"
-    body_interval: Annotated[float | Literal["step"], number_or("step", "s", 1e-6, 10.0)] = 1e-3
-    wheel_channels: Annotated[tuple[str, ...], channel_names(WHEEL)] = tuple(WHEEL)
-    body_channels: Annotated[tuple[str, ...], channel_names(BODY)] = tuple(BODY)
-    irregularity_channels: Annotated[tuple[str, ...], channel_names(IRREGULARITY)] = tuple(IRREGULARITY)
-    precision: Literal["single", "double"] = "single"
-    run_in: Annotated[float, Q("m", "way that statistics leave out", ge=0)] = 50.0
 
 
 class Scenario(Params):
@@ -134,14 +45,16 @@ class Scenario(Params):
         presets: Tables of the presets used, by kind and name; they come before the library's.
     """
 
-    name: str = "unnamed"
-    source: str = ""
+    name: PlainName = "unnamed"
+    source: Source = ""
     train: Train
     track: Track = Track()
     irregularity: IrregularityParams = IrregularityParams()
     contact: Contact = Contact()
     numerics: Numerics = Numerics()
     output: Output = Output()
+    gauges: Annotated[tuple[Gauge, ...], Field(max_length=1000)] = ()
+    events: Events = Events()
     ensemble: Ensemble = Ensemble()
     presets: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
 
@@ -213,7 +126,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
     ensemble = _absolute_vary(scenario.ensemble, folder)
     presets = collect_presets(scenario.train, scenario.track, scenario.presets, folder)
     if ensemble.vary:
-        for i in range(ensemble.size):
+        for i in range(ensemble.different):
             train = _changed(tables, ensemble, i)
             presets |= collect_presets(train.train, train.track, presets, folder)
     scenario = scenario.model_copy(update={"presets": presets, "ensemble": ensemble})
@@ -286,7 +199,12 @@ def _absolute(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
     irregularity = tables.get("irregularity")
     if not isinstance(irregularity, dict) or not isinstance(irregularity.get("file"), str):
         return tables
-    path = ((folder or Path()) / Path(irregularity["file"]).expanduser()).resolve()
+    name = irregularity["file"]
+    path = user_path(name, folder, "irregularity.file")
+    try:
+        path = path.resolve()
+    except (OSError, RuntimeError) as error:  # links that lead in a circle
+        raise InputError(f"irregularity.file = {name!r}: {error}") from None
     return {**tables, "irregularity": {**irregularity, "file": str(path)}}
 
 
@@ -308,6 +226,17 @@ def _check(scenario: Scenario) -> None:
             f"numerics.window = {window:g}: window shorter than the train; must be at least {least:g} m"
             f" (wheels over {parts.wheel_span:g} m and {WINDOW_MARGIN_LEAST:g} m at either end)"
         )
+    if window > LONGEST_WINDOW or scenario.modes > MOST_MODES:
+        raise InputError(
+            f"numerics.window: {window:g} m with {scenario.modes} modes: must be at most {LONGEST_WINDOW:g} m and"
+            f" {MOST_MODES} modes; choose a shorter train or a smaller numerics.modes_per_metre"
+        )
+    duration = scenario.train.distance / min(scenario.train.speed.speed)
+    if duration > LONGEST_RUN:
+        raise InputError(
+            f"train.speed_kmh: {scenario.train.distance:g} m would take up to {duration:.3g} s;"
+            f" must be at most {LONGEST_RUN:g} s"
+        )
     zone, widest = scenario.numerics.absorbing_zone, 0.5 * (window - least)
     if zone > widest + 1e-9:
         raise InputError(
@@ -327,6 +256,9 @@ def _check(scenario: Scenario) -> None:
         scenario.track.mortar_voids,
         end=scenario.rear + scenario.train.distance + window,
         slab=parts.slab,
+    )
+    check_gauges(
+        scenario.gauges, begin=scenario.rear, end=scenario.rear + scenario.train.distance + window, slab=parts.slab
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact_cache import contact_table
-from tiengine.contact_geometry import ContactSettings, ContactTable
+from tiengine.contact_geometry import ContactSettings
 from tiengine.defects import fastening_factors
 from tiengine.integrator import Newmark
 from tiengine.model import Ingredients, SlabDesigns
@@ -17,7 +17,7 @@ from tiengine.scenario import Scenario
 from tiengine.slab import slab_designs
 from tiengine.train import TrainModel, assemble
 
-__all__ = ["ingredients"]
+__all__ = ["contact_settings", "ingredients"]
 
 
 def ingredients(scenario: Scenario, dt: float) -> Ingredients:
@@ -40,7 +40,7 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         mortar=parts.mortar,
         designs=_designs(scenario),
         train=train,
-        contact=_contact(scenario, train),
+        contact=contact_table(parts.wheel, parts.rail_profile, contact_settings(scenario, train)),
         friction=scenario.track.friction,
         cross_level_rolls=scenario.contact.cross_level_rolls_rails,
         length=scenario.window_length,
@@ -54,8 +54,12 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
     )
 
 
-def _contact(scenario: Scenario, train: TrainModel) -> ContactTable:
-    """Contact table of the train's wheels on the rail; one kind of wheel in a train."""
+def contact_settings(scenario: Scenario, train: TrainModel) -> ContactSettings:
+    """How the scenario places its wheels on its rails, and what they are made of; one kind of wheel in a train.
+
+    Raises:
+        InputError: Vehicles whose wheels differ.
+    """
     parts, track = scenario.parts, scenario.track
     for what, values in (("wheel_radius", train.wheel_radius), ("half_span_contact", train.half_spacing)):
         if np.ptp(values) > 0.0:
@@ -63,7 +67,7 @@ def _contact(scenario: Scenario, train: TrainModel) -> ContactTable:
                 f"train.vehicles: {what} is {values.min():g} and {values.max():g} m;"
                 " vehicles of one train must agree, they share a contact table"
             )
-    settings = ContactSettings(
+    return ContactSettings(
         gauge=track.gauge,
         gauge_depth=track.gauge_depth,
         cant=track.cant,
@@ -74,7 +78,6 @@ def _contact(scenario: Scenario, train: TrainModel) -> ContactTable:
         hertz=scenario.contact.hertz,
         smoothing=scenario.contact.smoothing,
     )
-    return contact_table(parts.wheel, parts.rail_profile, settings)
 
 
 def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64]]:

@@ -7,28 +7,39 @@ import time
 _clock = time.perf_counter()  # importing the engine's packages is part of what a user waits for
 
 import os  # noqa: E402
-from collections.abc import Generator, Sequence  # noqa: E402
+from collections.abc import Callable, Generator, Sequence  # noqa: E402
 from contextlib import closing  # noqa: E402
+from dataclasses import dataclass  # noqa: E402
 from pathlib import Path  # noqa: E402
 from typing import Any  # noqa: E402
 
 from threadpoolctl import threadpool_limits  # noqa: E402
 
-from tiengine.events import RunFailedError  # noqa: E402
-from tiengine.gather import Gathering, Progress  # noqa: E402
-from tiengine.march import Message, march  # noqa: E402
+from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths  # noqa: E402
+from tiengine.disk_space import check_space  # noqa: E402
+from tiengine.events import RunFailedError, RunStoppedError  # noqa: E402
+from tiengine.gather import Gathering, Progress, Tell  # noqa: E402
+from tiengine.groups import GroupSpec  # noqa: E402
+from tiengine.march import march, never  # noqa: E402
+from tiengine.messages import Message  # noqa: E402
+from tiengine.output_file import check_output  # noqa: E402
 from tiengine.plan import Task, plan  # noqa: E402
 from tiengine.prepare import AUTO_STEPS, prepare  # noqa: E402
 from tiengine.quantity import InputError  # noqa: E402
 from tiengine.recorder import Recorder  # noqa: E402
 from tiengine.results import Result  # noqa: E402
+from tiengine.results import open as open_result  # noqa: E402
 from tiengine.scenario import Scenario, load_scenario, to_toml  # noqa: E402
+from tiengine.trackside import trackside_groups  # noqa: E402
 from tiengine.worker import distribute  # noqa: E402
-from tiengine.writer import Writer, check_output  # noqa: E402
+from tiengine.writer import Writer  # noqa: E402
 
 IMPORT_SECONDS = time.perf_counter() - _clock
 
-__all__ = ["AUTO_STEPS", "Progress", "prepare", "run"]
+__all__ = ["AUTO_STEPS", "CHECKPOINT_SECONDS", "Progress", "prepare", "resume", "run"]
+
+CHECKPOINT_SECONDS = 60.0
+"""Wall time between two checkpoints; one takes some 30 ms."""
 
 
 def run(
@@ -37,7 +48,10 @@ def run(
     *,
     force: bool = False,
     progress: Progress | None = None,
+    tell: Tell | None = None,
     workers: int | None = None,
+    checkpoint: float = CHECKPOINT_SECONDS,
+    stop: Callable[[], bool] = never,
     public_launch: bool = False,
 ) -> Result:
     """Simulate a scenario: one train, or the trains of its ensemble.
@@ -50,8 +64,11 @@ def run(
         output: HDF5 file to write; in memory if None.
         force: Replace an existing file.
         progress: Called with simulated time and end time [s] now and then, of all trains together.
+        tell: Called with a sentence for what happens on the way: events of the trains, workers that die.
         workers: Processes for an ensemble; one or less: all is done in this one. None: one a core, and for each of
             Taichi's threads one less. Never more than there are tasks; one train alone is run here.
+        checkpoint: Wall time between two checkpoints [s], from which :func:`resume` goes on.
+        stop: Asked now and then; if true, the chunk of steps is finished, saved, and left.
         public_launch: Launch kernels by public Taichi calls only (slower; for comparison).
 
     Returns:
@@ -60,44 +77,126 @@ def run(
     Raises:
         InputError: The scenario breaks a rule, or the file cannot be written.
         RunFailedError: Every train derailed or had its numbers run away; the file holds what was computed until then.
+        RunStoppedError: It was asked to stop; the file holds what was computed until then and can be resumed.
     """
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     path = None if output is None else Path(output)
     if path is not None:
         check_output(path, force)
-    tasks = plan(scenario)
-    count = min(_workers(scenario) if workers is None else workers, len(tasks))
-    clock = time.perf_counter()
-    with (
-        threadpool_limits(1),  # BLAS on one thread: the same bits on any machine
-        Writer(
-            path, to_toml(scenario), {}, [], Recorder.groups_of(scenario), scenario.output.precision, force=force
-        ) as writer,
-        closing(_messages(tasks, count, public_launch)) as messages,
-    ):
-        gathering = Gathering(scenario, writer, progress)
-        for message in messages:
-            gathering.take(message)
-        if len(gathering.refused) == len(scenario.members):
+        check_space(scenario, path)
+    job = _Job(scenario, path, workers, checkpoint, stop, public_launch)
+    groups = _groups(scenario)
+    with Writer(path, to_toml(scenario), {}, [], groups, scenario.output.precision, force=force) as writer:
+        return job.do(writer, Gathering(scenario, writer, path, progress, tell), plan(scenario))
+
+
+def resume(
+    file: Path | str,
+    *,
+    progress: Progress | None = None,
+    tell: Tell | None = None,
+    workers: int | None = None,
+    checkpoint: float = CHECKPOINT_SECONDS,
+    stop: Callable[[], bool] = never,
+) -> Result:
+    """Go on with a run that was stopped, killed, or out of disk; trains get the same bits as without a break.
+
+    Args:
+        file: Its result file; checkpoints are looked for beside it. Trains without one begin anew.
+        progress: See :func:`run`.
+        tell: See :func:`run`.
+        workers: See :func:`run`; may be another number than before.
+        checkpoint: See :func:`run`.
+        stop: See :func:`run`.
+
+    Returns:
+        The result, open for reading.
+
+    Raises:
+        InputError: The file is no result of this program, complete, being written, or a checkpoint is damaged.
+        RunFailedError: See :func:`run`.
+        RunStoppedError: See :func:`run`.
+    """
+    path = Path(file)
+    with open_result(path) as result:
+        scenario = result.scenario
+    job = _Job(scenario, path, workers, checkpoint, stop, False)
+    with Writer.resume(path, _groups(scenario), scenario.output.precision) as writer:
+        gathering = Gathering(scenario, writer, path, progress, tell)
+        saved = {each.task: each for each in map(Checkpoint.read, checkpoint_paths(path))}
+        for each in saved.values():
+            each.check(str(checkpoint_path(path, each.task)))
+            if each.foreign and tell is not None:
+                tell(f"made with {', '.join(each.foreign)}: the bits may differ from those of one run")
+        tasks = plan(scenario)
+        gathering.go_on(saved, job.count(tasks))
+        return job.do(writer, gathering, [task for task in tasks if not gathering.ended.issuperset(task.trains)])
+
+
+@dataclass(frozen=True)
+class _Job:
+    """How the trains of a scenario are computed.
+
+    Attributes:
+        scenario, path, workers, checkpoint, stop, public: As given to :func:`run`.
+    """
+
+    scenario: Scenario
+    path: Path | None
+    workers: int | None
+    checkpoint: float
+    stop: Callable[[], bool]
+    public: bool
+
+    def count(self, tasks: Sequence[Task]) -> int:
+        """Worker processes for some tasks."""
+        return min(_workers(self.scenario) if self.workers is None else self.workers, len(tasks))
+
+    def do(self, writer: Writer, gathering: Gathering, tasks: Sequence[Task]) -> Result:
+        """Run tasks into a file and complete it."""
+        clock, count = time.perf_counter(), self.count(tasks)
+        with threadpool_limits(1), closing(self._messages(tasks, count, gathering)) as messages:
+            for message in messages:  # BLAS on one thread: the same bits on any machine
+                gathering.take(message)
+        everyone = len(self.scenario.members)
+        if len(gathering.refused) == everyone:
             raise InputError(gathering.failed[0])
+        if gathering.unfinished:
+            done, whole = gathering.simulated
+            raise RunStoppedError(f"stopped after {done:.3f} of {whole:.3f} s of simulated time")
         times = {"import": IMPORT_SECONDS, "total": time.perf_counter() - clock}
         result = gathering.close(times, count if count > 1 else 0)
-    if len(gathering.failed) == len(scenario.members):
-        result.close()
-        raise RunFailedError("; ".join(f"train {train}: {why}" for train, why in sorted(gathering.failed.items())))
-    return result
+        if len(gathering.failed) == everyone:
+            result.close()
+            raise RunFailedError("; ".join(f"train {train}: {why}" for train, why in sorted(gathering.failed.items())))
+        return result
+
+    def _messages(self, tasks: Sequence[Task], workers: int, gathering: Gathering) -> Generator[Message, None, None]:
+        """What the trains of all tasks send."""
+        if workers > 1:
+            yield from distribute(
+                tasks,
+                workers,
+                gathering.latest,
+                public=self.public,
+                every=self.checkpoint,
+                stop=self.stop,
+                tell=gathering.tell,
+            )
+            return
+        for task in tasks:
+            saved = gathering.latest.get(task.number)
+            yield from march(task, public=self.public, saved=saved, every=self.checkpoint, stop=self.stop)
+            if self.stop():
+                return
+
+
+def _groups(scenario: Scenario) -> dict[str, GroupSpec]:
+    """What each train records."""
+    return Recorder.groups_of(scenario) | trackside_groups(scenario)
 
 
 def _workers(scenario: Scenario) -> int:
     """One process a core, if each runs on one thread."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(cores // scenario.numerics.threads, 1)
-
-
-def _messages(tasks: Sequence[Task], workers: int, public: bool) -> Generator[Message, None, None]:
-    """What the trains of all tasks send."""
-    if workers > 1:
-        yield from distribute(tasks, workers, public=public)
-    else:
-        for task in tasks:
-            yield from march(task, public=public)

@@ -80,6 +80,15 @@ class State:
         columns, shape = self._blocks[block]
         return self.motion[row, columns].reshape(shape)
 
+    def clear(self, train: int) -> None:
+        """Take a train whose numbers ran away out of the way: nothing moves, no forces."""
+        for row in (at.U, at.V, at.A):
+            for block in self._blocks:
+                self.view(row, block)[train] = 0.0
+        for forces in (self.seat_force, self.pressure, self.force, self.wheelset_force, self.rail_force):
+            forces[train] = 0.0
+        self.contact[train] = _first_contact(1, self.contact.shape[1])[0]
+
     def enter(self, model: Model, first_seat: int, first_slab: int) -> None:
         """Move the window on to its rear seat and slab: drop what it leaves, bring fresh slabs in at rest.
 

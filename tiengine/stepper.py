@@ -68,7 +68,9 @@ class Stepper:
 
     Attributes:
         scratch: What the stages leave for one another.
-        stages: Name and call of what one step does, pass by pass, in this order.
+        stages: Name and call of what one step does, pass by pass, in this order; those who watch the step add theirs.
+        factored_speed: Speed for which what depends on it was made [m/s].
+        asked: Rows that the step is to fill: of the chunk, of the wheels' record, of the bodies' (-1 none).
     """
 
     def __init__(self, model: Model, state: State, chunk: Chunk, *, parallel: bool = False, public: bool = False):
@@ -88,12 +90,12 @@ class Stepper:
         self._tick[-1, at.LAST_PASS] = 1
         self._launches: list[Launch] = []
         self._parallel, self._public = parallel, public
-        self._speed = float("nan")
+        self.factored_speed = float("nan")
         self._window = (-1, -1)
         self._odd: list[tuple[int, int]] = []
         self._slabs = slice(int(model.dims[at.SLABS]), int(model.dims[at.VEHICLES]))
         self._moves = np.zeros(0, dtype=np.bool_)
-        self._body_row = -1
+        self.asked = (-1, -1, -1)
         self._vehicles = [state.view(row, "vehicles") for row in (at.U, at.V, at.A)]
         self.stages = tuple(self._stages())
 
@@ -180,7 +182,7 @@ class Stepper:
 
     def _record_bodies(self) -> None:
         """Copy the bodies' motion and what the bed feels, if this step is asked for them."""
-        row = self._body_row
+        row = self.asked[2]
         if row < 0:
             return
         chunk, bodies = self.chunk, self.chunk.body.shape[-1]
@@ -272,7 +274,7 @@ class Stepper:
         if self._moves[i]:
             self.move(i)
         self._tick[:, _ASKED] = i, wheel_row
-        self._body_row = body_row
+        self.asked = i, wheel_row, body_row
         for _, stage in self.stages:
             stage()
 
@@ -284,9 +286,14 @@ class Stepper:
             self._window = window
             self.state.enter(self.model, *window)
             self._odd = [(int(slot), int(self.state.design[0, slot])) for slot in np.flatnonzero(self.state.design[0])]
-        if V != self._speed and not abs(V - self._speed) < REFACTOR * self._speed:
-            self.model.refactor(V)
-            self._speed = V
+        factored = self.factored_speed
+        if V != factored and not abs(V - factored) < REFACTOR * factored:
+            self.factor(V)
+
+    def factor(self, V: float) -> None:
+        """Make anew what depends on the speed V [m/s]."""
+        self.model.refactor(V)
+        self.factored_speed = V
 
     def _flat(self, row: int, block: str) -> NDArray[np.float64]:
         """A block as right-hand sides, shape (B m, n)."""

@@ -12,13 +12,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.events import RunFailedError, check_chunk
+from tiengine.events import RunFailedError
+from tiengine.guards import Guard
 from tiengine.irregularity import Irregularity
 from tiengine.march import CHUNK_STEPS
 from tiengine.quantity import InputError
 from tiengine.recorder import Recorder
 from tiengine.scenario import Scenario
 from tiengine.stepper import Stepper
+from tiengine.trackside import Trackside
 from tiengine.writer import Writer
 
 __all__ = ["REST", "StageTimers", "TimedLoop", "Times", "shown"]
@@ -137,7 +139,8 @@ class TimedLoop:
         scenario: What runs.
         stepper: Model, state, buffers, step.
         timers: Around its stages.
-        recorder: Decides what is recorded.
+        recorder, trackside: Decide what is recorded.
+        guard: Looks for what goes wrong.
         writer: Writes it, to a temporary file.
         irregularities: One a train.
         position: Chainage of the first vehicle's centre [m].
@@ -149,6 +152,8 @@ class TimedLoop:
     stepper: Stepper
     timers: StageTimers
     recorder: Recorder
+    trackside: Trackside
+    guard: Guard
     writer: Writer
     irregularities: list[Irregularity]
     position: float
@@ -180,6 +185,7 @@ class TimedLoop:
         felt = np.stack([each.sample(wheels) for each in self.irregularities])
         lap("irregularity")
         self.stepper.load(x - model.centre_s, V, V_rate, felt)
+        self.guard.load(self.done, x)
         lap("window and seats")
         self.position = float(x[-1])
         return x
@@ -218,11 +224,12 @@ class TimedLoop:
             lap(None)
             self.stepper.fill_pressures(self.recorder.body_rows(self.done, count))
             lap("mortar")
-            failures = check_chunk(self.stepper.model, self.stepper.chunk, self.recorder, self.done + 1, x)
-            if failures:
-                raise RunFailedError("; ".join(f"train {b}: {why}" for b, why in failures.items()))
-            lap("checks")
+            events = self.guard.take()
+            if self.guard.stopped:
+                raise RunFailedError("; ".join(f"train {b}: {events[b][-1]}" for b in self.guard.stopped))
             self.recorder.write(self.writer, self.stepper.chunk, self.done + 1, x)
+            for train, blocks in enumerate(self.trackside.blocks(self.recorder.ends(self.done + 1, count), x)):
+                self.writer.write(train, blocks)
             lap("writing")
             self.done += count
         return times

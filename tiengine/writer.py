@@ -8,139 +8,52 @@
     /trains/000/body                    channels (time, body, dof)
     /trains/000/irregularity            channels (time, wheelset, side)
     /trains/000/mortar                  channels (time, slot)
+    /trains/000/seats                   channels (seat, side)
+    /trains/000/slabs                   channels (slab,)
+    /trains/000/deflection              channels (time, side, point)
+    /trains/000/events                  what went wrong: (event,), see tiengine.event_table
+    /trains/000/gauges/NAME             channels (time, direction) or (time,); attributes on, chainage, side or y
 
 Every group holds its own coordinates as dimension scales: ``time`` [s], ``position`` [m] (chainage of the
-first vehicle's centre) and its labels. Groups sampled together share their times by hard links. Time and
-position are float64, channels float32 or float64.
+first vehicle's centre) and its labels; ``seats`` and ``slabs`` their index and ``chainage`` [m] instead of time.
+Groups sampled together share their times by hard links. Times and chainages are float64, channels float32 or float64.
 
-The file grows under a temporary name beside its target and gets its name when it is complete, so a run that
-fails leaves nothing behind.
+Attribute ``status`` of the root is "running" until the run has come to its end.
 """
 
 from __future__ import annotations
 
-import os
-import platform
-import uuid
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.channels import DOFS, GROUPS, SIDES, Channel
+from tiengine.channels import Channel
 from tiengine.column import Column
+from tiengine.event_table import EVENTS, create_events, event_columns
+from tiengine.events import Event
+from tiengine.groups import CHUNK, Axis, Block, GroupSpec, TrainLabels
+from tiengine.output_file import OutputFile, header
 from tiengine.quantity import InputError
-from tiengine.results import FORMAT, FORMAT_VERSION, Result
+from tiengine.results import Result
 
-__all__ = ["DTYPES", "Block", "GroupSpec", "TrainLabels", "Writer", "check_output"]
+__all__ = ["DTYPES", "Block", "GroupSpec", "TrainLabels", "Writer"]
 
 Reals = NDArray[np.float64]
 
-CHUNK = 1000  # samples along time: a chunk of a coach's channel is 32 kB
+CHECKED = {"fletcher32": True}  # a checksum with every chunk: a damaged number is found out, not taken for one
+
 DTYPES = {"single": np.float32, "double": np.float64}
-PACKAGES = ("numpy", "scipy", "taichi", "h5py", "pydantic")
-
-
-@dataclass(frozen=True)
-class TrainLabels:
-    """Labels of one train.
-
-    Attributes:
-        vehicles: Names of the vehicles.
-        bodies: Names of the bodies, unique in the train.
-        wheelset_vehicle: Vehicle of each wheelset, from 0, shape (wheelsets,).
-        wheelset_offset: Wheelset relative to the first vehicle's centre [m], shape (wheelsets,).
-        slots: Slabs in the window.
-    """
-
-    vehicles: Sequence[str]
-    bodies: Sequence[str]
-    wheelset_vehicle: NDArray[np.integer[Any]]
-    wheelset_offset: Reals
-    slots: int = 0
-
-    def scales(self, dimensions: Sequence[str]) -> dict[str, tuple[Any, Channel]]:
-        """Values and meaning of the labels along some dimensions."""
-        known: dict[str, tuple[Any, Channel]] = {
-            "wheelset": (
-                np.arange(1, len(self.wheelset_offset) + 1, dtype=np.int32),
-                Channel("1", "wheelset, 1 leads"),
-            ),
-            "side": (list(SIDES), Channel("1", "side of the track, looking forward")),
-            "body": (list(self.bodies), Channel("1", "body of the train")),
-            "dof": (list(DOFS), Channel("1", "degree of freedom of a body")),
-            "slot": (np.arange(self.slots, dtype=np.int32), Channel("1", "place of a slab in memory")),
-        }
-        return {name: known[name] for name in dimensions}
-
-
-@dataclass(frozen=True)
-class GroupSpec:
-    """What a group of channels holds.
-
-    Attributes:
-        dimensions: Dimensions after time, such as ``("wheelset", "side")``.
-        channels: Units and meaning by name.
-        times_of: Group that is sampled at the same times and whose coordinates are linked; None for its own.
-    """
-
-    dimensions: tuple[str, ...]
-    channels: Mapping[str, Channel]
-    times_of: str | None = None
-
-    @classmethod
-    def standard(cls, group: str, names: Sequence[str], times_of: str | None = None) -> GroupSpec:
-        """Some channels of one of the groups of :mod:`tiengine.channels`."""
-        dimensions = {"body": ("body", "dof"), "mortar": ("slot",)}.get(group, ("wheelset", "side"))
-        return cls(dimensions, {name: GROUPS[group][name] for name in names}, times_of)
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """Samples of one group of one train.
-
-    Attributes:
-        time: Times [s], shape (n,); ignored where the group shares another one's.
-        position: Chainages of the first vehicle's centre [m], shape (n,); likewise.
-        channels: Every channel of the group, shape (n, *dimensions).
-    """
-
-    time: Reals
-    position: Reals
-    channels: Mapping[str, NDArray[Any]]
-
-
-def check_output(path: Path, force: bool = False) -> None:
-    """Refuse a path that cannot become a result file, before anything is computed.
-
-    Args:
-        path: Where the file shall be.
-        force: Whether an existing file may be replaced.
-
-    Raises:
-        InputError: The path is a folder, exists already, or lies in no folder that can be written.
-    """
-    if path.is_dir():
-        raise InputError(f"output = '{path}': must be a file, not a folder")
-    if path.exists() and not force:
-        raise InputError(f"output = '{path}': exists already; choose another name or --force")
-    if not path.parent.is_dir():
-        raise InputError(f"output = '{path}': there is no folder '{path.parent}'")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"output = '{path}': the folder '{path.parent}' cannot be written to")
 
 
 class Writer:
     """A result file that is being written.
 
-    Use as a context manager: leaving it by an exception, or without :meth:`close`, removes the file.
+    Use as a context manager: leaving it by an exception, or without :meth:`close`, keeps what was committed if samples
+    are in it (the run can be resumed from its checkpoints), and removes the file otherwise.
     """
 
     def __init__(
@@ -168,21 +81,46 @@ class Writer:
         Raises:
             InputError: The path cannot be written.
         """
-        self._finished = False
-        self._path = path
-        self._specs = dict(groups)
-        self._columns: dict[tuple[int, str], dict[str, Column]] = {}
-        self._dtype = DTYPES[precision]
-        self._temporary = None if path is None else path.with_name(f".{path.name}.{os.getpid()}.part")
-        self._file = self._create(force)
+        replaces = path is not None and path.exists()
+        self._take(OutputFile.create(path, force), groups, precision)
         try:
-            self._file.attrs.update(_header(scenario_toml))
+            self._file.attrs.update(header(scenario_toml))
             self._file.attrs.update(attributes)
+            self._file.create_group("trains")
             for i, labels in enumerate(trains):
                 self.add(i, labels)
+            if not replaces:
+                self._output.commit()
         except BaseException:
-            self.discard()
+            self.leave()
             raise
+
+    @classmethod
+    def resume(
+        cls, path: Path, groups: Mapping[str, GroupSpec], precision: Literal["single", "double"] = "single"
+    ) -> Writer:
+        """Go on with a file that a run has left unfinished; see :meth:`rewind`.
+
+        Args:
+            path: The file.
+            groups: As given when it was created.
+            precision: Likewise.
+
+        Raises:
+            InputError: It is not an unfinished result, or another run writes it.
+        """
+        writer = cls.__new__(cls)
+        writer._take(OutputFile.resume(path), groups, precision)
+        writer._samples_kept = True
+        return writer
+
+    def _take(self, output: OutputFile, groups: Mapping[str, GroupSpec], precision: str) -> None:
+        self._output, self._file, self._path = output, output.h5, output.path
+        self._finished = self._samples_written = self._samples_kept = False
+        self._specs = dict(groups)
+        self._columns: dict[tuple[int, str], dict[str, Column]] = {}
+        self._events: dict[int, int] = {}
+        self._dtype = DTYPES[precision]
 
     def __enter__(self) -> Writer:
         """The writer itself."""
@@ -191,11 +129,11 @@ class Writer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Remove the file unless it was closed."""
-        self.discard()
+        """Leave the file as it is, or remove an empty one, unless it was closed."""
+        self.leave()
 
     def add(self, train: int, labels: TrainLabels | None, attributes: Mapping[str, Any] | None = None) -> None:
-        """Add a train to the file.
+        """Add a train to the file, or begin one anew that is in it.
 
         Args:
             train: Its number.
@@ -204,15 +142,57 @@ class Writer:
         """
         node = self._file.require_group(f"trains/{train:03d}")
         if labels is not None:
-            self._create_train(node, labels)
-            for name, spec in self._specs.items():
-                grow = (*spec.channels, *(() if spec.times_of else ("time", "position")))
-                self._columns[train, name] = {key: Column(node[f"{name}/{key}"]) for key in grow}
+            if "vehicles" not in node.attrs:
+                self._create_train(node, labels)
+            self.rewind(train, {})
         node.attrs.update(attributes or {})
+
+    def rewind(self, train: int, rows: Mapping[str, int]) -> None:
+        """Write on from an earlier sample of a train; what the file holds beyond it stays until it is overwritten.
+
+        Args:
+            train: Its number.
+            rows: Samples of each group that stay, as from :meth:`rows`; none where not given.
+
+        Raises:
+            InputError: The file holds fewer.
+        """
+        node = self._file[f"trains/{train:03d}"]
+        for name, spec in self._specs.items():
+            grow = (*spec.channels, *(() if spec.times_of else (spec.axis.name, spec.axis.place)))
+            kept = rows.get(name, 0)
+            if any(node[f"{name}/{key}"].shape[0] < kept for key in grow):
+                raise InputError(f"{self._path}: train {train} holds less than its checkpoint says; run it anew")
+            self._columns[train, name] = {key: Column(node[f"{name}/{key}"], kept) for key in grow}
+        self._events[train] = rows.get(EVENTS, 0)
+
+    def rows(self, train: int) -> dict[str, int]:
+        """Samples of each group of a train written so far."""
+        samples = {name: next(iter(self._columns[train, name].values())).length for name in self._specs}
+        return samples | {EVENTS: self._events[train]}
 
     def describe(self, train: int, attributes: Mapping[str, Any]) -> None:
         """Add attributes to a train of the file."""
         self._file[f"trains/{train:03d}"].attrs.update(attributes)
+
+    def facts(self) -> dict[int, dict[str, Any]]:
+        """Attributes of every train in the file."""
+        return {int(name): dict(node.attrs) for name, node in self._file["trains"].items()}
+
+    def note(self, train: int, events: Sequence[Event]) -> None:
+        """Add events to a train of the file.
+
+        Args:
+            train: Its number.
+            events: What happened, in order.
+        """
+        group = self._file[f"trains/{train:03d}/{EVENTS}"]
+        start = self._events[train]
+        self._events[train] = end = start + len(events)
+        for name, column in event_columns(events, start).items():
+            if group[name].shape[0] < end:
+                group[name].resize(end, axis=0)
+            group[name][start:end] = column
 
     def write(self, train: int, blocks: Mapping[str, Block]) -> None:
         """Add samples to the groups of one train.
@@ -225,24 +205,25 @@ class Writer:
             InputError: The disk is full or gone.
         """
         for group, block in blocks.items():
-            self.append(train, group, block.time, block.position, block.channels)
+            self.append(train, group, block.along, block.place, block.channels)
 
     def append(
-        self, train: int, group: str, time: Reals, position: Reals, channels: Mapping[str, NDArray[Any]]
+        self, train: int, group: str, along: NDArray[Any], place: Reals, channels: Mapping[str, NDArray[Any]]
     ) -> None:
         """Add samples to one group of one train.
 
         Args:
             train: Index of the train.
             group: Name of the group.
-            time: Times [s], shape (n,); ignored where the group shares another one's.
-            position: Chainages of the first vehicle's centre [m], shape (n,); likewise.
+            along: Times [s], or indices of seats or slabs, shape (n,); ignored where the group shares another one's.
+            place: Chainages that belong to them [m], shape (n,); likewise.
             channels: Every channel of the group, shape (n, *dimensions).
 
         Raises:
             ValueError: A channel is missing, unknown, or of the wrong shape.
             InputError: The disk is full or gone.
         """
+        self._samples_written = True
         columns = self._columns[train, group]
         spec = self._specs[group]
         if set(channels) != set(spec.channels):
@@ -250,9 +231,9 @@ class Writer:
             raise ValueError(f"group {group!r}: channels missing or unknown: {', '.join(odd)}")
         values: dict[str, NDArray[Any]] = dict(channels)
         if spec.times_of is None:
-            values |= {"time": time, "position": position}
+            values |= {spec.axis.name: along, spec.axis.place: place}
         for name, value in values.items():
-            expected = (len(time), *columns[name].rest)
+            expected = (len(along), *columns[name].rest)
             if value.shape != expected:
                 raise ValueError(f"{group}/{name}: shape {value.shape}, expected {expected}")
             try:
@@ -260,8 +241,17 @@ class Writer:
             except OSError as error:
                 raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
 
+    def commit(self) -> None:
+        """Make what was written permanent; the file can be read with it from now on, whatever happens.
+
+        Raises:
+            InputError: The disk is full or gone.
+        """
+        self._output.commit()
+        self._samples_kept |= self._samples_written
+
     def close(self, attributes: Mapping[str, Any]) -> Result:
-        """Complete the file and give it its name.
+        """Complete the file.
 
         Args:
             attributes: Root attributes known at the end: DOFs, step, wall times.
@@ -270,94 +260,66 @@ class Writer:
             The finished result, open for reading.
 
         Raises:
-            InputError: The file could not be completed or moved to its place.
+            InputError: The file could not be completed; it is as of the last commit.
         """
-        if self._path is None or self._temporary is None:
-            self._file.attrs.update(attributes)
-            self._finished = True
-            return Result(self._file, "in memory")
-        try:
-            self._file.attrs.update(attributes)
-            self._file.close()
-            os.replace(self._temporary, self._path)
-        except (OSError, RuntimeError) as error:  # h5py says RuntimeError when the disk is full
-            self.discard()
-            raise InputError(f"output = '{self._path}': cannot be completed ({error})") from None
+        result = self._output.complete(attributes)
         self._finished = True
-        return Result(h5py.File(self._path, "r"), str(self._path))
+        return result
 
-    def discard(self) -> None:
-        """Remove what was written, unless it was closed."""
-        if self._finished:
-            return
-        with suppress(OSError, RuntimeError):  # a full disk once more
-            self._file.close()
-        if self._temporary is not None:
-            self._temporary.unlink(missing_ok=True)
-
-    def _create(self, force: bool) -> Any:
-        if self._path is None or self._temporary is None:
-            name = f"tiengine-{uuid.uuid4()}"  # HDF5 refuses two open files of one name, in memory too
-            return h5py.File(name, "w", driver="core", backing_store=False, rdcc_nbytes=0)
-        check_output(self._path, force)
-        try:
-            return h5py.File(self._temporary, "w", rdcc_nbytes=0)  # else every open dataset holds 1 MB
-        except OSError as error:
-            raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
+    def leave(self) -> None:
+        """Leave a file that was not closed as of its last commit; remove it if it held no samples then."""
+        if not self._finished:
+            self._finished = True
+            self._output.leave(keep=self._samples_kept)
 
     def _create_train(self, train: Any, labels: TrainLabels) -> None:
         """Groups, scales and empty channels of one train."""
         train.attrs["vehicles"] = list(labels.vehicles)
         for name, spec in self._specs.items():
             group = train.create_group(name)
+            group.attrs.update(spec.attributes)
+            axis = spec.axis
             if spec.times_of is None:
-                self._create_times(group)
+                _create_axis(group, axis)
             else:
-                group["time"] = train[f"{spec.times_of}/time"]
-                group["position"] = train[f"{spec.times_of}/position"]
-            scales = labels.scales(spec.dimensions)
-            for scale, (values, meaning) in scales.items():
-                _describe(group.create_dataset(scale, data=values), meaning).make_scale(scale)
-            coordinates = ["position"]
-            if "wheelset" in spec.dimensions:
-                coordinates += _create_wheelset_labels(group, labels)
+                for dataset in (axis.name, axis.place):
+                    group[dataset] = train[f"{spec.times_of}/{dataset}"]
+            coordinates = [axis.place]
+            for dimension, (values, meaning) in labels.scales(spec.dimensions).items():
+                _describe(group.create_dataset(dimension, data=values), meaning).make_scale(dimension)
+                coordinates += _create_details(group, dimension, labels)
             for channel, meaning in spec.channels.items():
                 self._create_channel(group, channel, meaning, spec, coordinates)
         if "wheel" in self._specs:
             train["time"] = train["wheel/time"]
-
-    def _create_times(self, group: Any) -> None:
-        time = group.create_dataset("time", (0,), "f8", maxshape=(None,), chunks=(CHUNK,))
-        _describe(time, Channel("s", "time")).make_scale("time")
-        position = group.create_dataset("position", (0,), "f8", maxshape=(None,), chunks=(CHUNK,))
-        _describe(position, Channel("m", "chainage of the first vehicle's centre"))
-        position.dims[0].attach_scale(time)
+        create_events(train.create_group(EVENTS))
 
     def _create_channel(
         self, group: Any, name: str, meaning: Channel, spec: GroupSpec, coordinates: Sequence[str]
     ) -> None:
         """One empty channel with its scales."""
         rest = tuple(group[dimension].shape[0] for dimension in spec.dimensions)
-        dataset = group.create_dataset(name, (0, *rest), self._dtype, maxshape=(None, *rest), chunks=(CHUNK, *rest))
+        chunks = (spec.chunk, *rest)
+        dataset = group.create_dataset(name, (0, *rest), self._dtype, maxshape=(None, *rest), chunks=chunks, **CHECKED)
         _describe(dataset, meaning).attrs["coordinates"] = " ".join(coordinates)
-        for axis, dimension in enumerate(("time", *spec.dimensions)):
-            dataset.dims[axis].attach_scale(group[dimension])
+        for i, dimension in enumerate((spec.axis.name, *spec.dimensions)):
+            dataset.dims[i].attach_scale(group[dimension])
 
 
-def _create_wheelset_labels(group: Any, labels: TrainLabels) -> list[str]:
-    """Vehicle and place of every wheelset; the names of the two datasets."""
-    rows = {
-        "wheelset_vehicle": (
-            np.asarray(labels.wheelset_vehicle, np.int32),
-            Channel("1", "vehicle of the wheelset, 0 leads"),
-        ),
-        "wheelset_offset": (
-            np.asarray(labels.wheelset_offset, np.float64),
-            Channel("m", "wheelset forward of the first vehicle's centre"),
-        ),
-    }
+def _create_axis(group: Any, axis: Axis) -> None:
+    """Empty scale of the dimension along which a group grows, and the chainages that go with it."""
+    scale = group.create_dataset(axis.name, (0,), axis.dtype, maxshape=(None,), chunks=(CHUNK,), **CHECKED)
+    _describe(scale, axis.meaning).make_scale(axis.name)
+    place = group.create_dataset(axis.place, (0,), "f8", maxshape=(None,), chunks=(CHUNK,), **CHECKED)
+    _describe(place, axis.place_meaning)
+    place.dims[0].attach_scale(scale)
+
+
+def _create_details(group: Any, dimension: str, labels: TrainLabels) -> list[str]:
+    """What else is known along a dimension; the names of the datasets."""
+    rows = labels.details(dimension)
     for name, (values, meaning) in rows.items():
-        _describe(group.create_dataset(name, data=values), meaning).dims[0].attach_scale(group["wheelset"])
+        _describe(group.create_dataset(name, data=values), meaning).dims[0].attach_scale(group[dimension])
     return list(rows)
 
 
@@ -365,17 +327,3 @@ def _describe(dataset: Any, meaning: Channel) -> Any:
     dataset.attrs["units"] = meaning.units
     dataset.attrs["long_name"] = meaning.long_name
     return dataset
-
-
-def _header(scenario_toml: str) -> dict[str, Any]:
-    """Root attributes of every file."""
-    versions = {f"{package}_version": metadata.version(package) for package in PACKAGES}
-    return {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        "tiengine_version": metadata.version("tiengine"),
-        "scenario": scenario_toml,
-        "python_version": platform.python_version(),
-        "platform": platform.platform(),
-        **versions,
-    }

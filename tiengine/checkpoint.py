@@ -1,0 +1,166 @@
+"""What a run needs to go on with the same bits: the state of the trains of one task between two chunks of steps.
+
+A checkpoint is a small file beside the result, one a task, put in place by an atomic rename: an npz archive of plain
+arrays and one text of facts (JSON). Nothing in it is ever executed. The track needs no place in it: irregularity is a
+function of seed and chainage.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.input_files import LARGEST_CHECKPOINT, check_regular
+from tiengine.journal import atomic_write
+from tiengine.quantity import InputError
+
+__all__ = ["Checkpoint", "checkpoint_path", "checkpoint_paths"]
+
+VERSION = 1
+FACTS = "facts"
+NUMBERS = {"done": int, "position": float, "loop": float, "speed": float, "first_seat": int, "first_slab": int}
+"""Facts that are one number, by its type; none is below zero."""
+
+MAKERS = ("tiengine", "numpy", "scipy", "taichi")
+"""Packages whose version may change the bits of a run."""
+
+
+def checkpoint_path(result: Path, task: int) -> Path:
+    """Where the checkpoint of a task lies.
+
+    Args:
+        result: The result file.
+        task: Number of the task.
+    """
+    return result.with_name(f".{result.name}.{task:04d}.checkpoint")
+
+
+def checkpoint_paths(result: Path) -> list[Path]:
+    """Checkpoints that lie beside a result."""
+    prefix, suffix = f".{result.name}.", ".checkpoint"
+    return sorted(
+        path
+        for path in result.parent.iterdir()
+        if path.name.startswith(prefix)
+        and path.name.endswith(suffix)
+        and path.name[len(prefix) : -len(suffix)].isdigit()
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """The trains of a task between two chunks.
+
+    Attributes:
+        task: Its number.
+        facts: Plain values: steps done, speed at the last factorisation, samples written, ...
+        arrays: State, by name.
+    """
+
+    task: int
+    facts: Mapping[str, Any]
+    arrays: Mapping[str, NDArray[Any]]
+
+    def write(self, result: Path) -> None:
+        """Put the checkpoint beside a result, in place of the one before it.
+
+        Args:
+            result: The result file.
+
+        Raises:
+            OSError: The disk is full or gone; the checkpoint before it stays.
+        """
+        made_by = {package: metadata.version(package) for package in MAKERS}
+        text = json.dumps({"version": VERSION, "made_by": made_by, "task": self.task, **self.facts})
+        content = io.BytesIO()
+        facts = np.frombuffer(text.encode(), dtype=np.uint8)
+        np.savez(content, allow_pickle=False, **{FACTS: facts, **self.arrays})
+        atomic_write(checkpoint_path(result, self.task), content.getvalue())
+
+    @classmethod
+    def read(cls, path: Path) -> Checkpoint:
+        """Read a checkpoint.
+
+        Args:
+            path: The file.
+
+        Raises:
+            InputError: It is damaged, or of another format.
+        """
+        where = str(path)
+        check_regular(path, where, LARGEST_CHECKPOINT)
+        try:
+            with zipfile.ZipFile(path) as archive:
+                members = archive.infolist()
+                if any(member.compress_type != zipfile.ZIP_STORED for member in members):
+                    raise ValueError("compressed")
+                if sum(member.file_size for member in members) > path.stat().st_size:
+                    raise ValueError("claims to hold more than it has bytes")
+                arrays = {member.filename.removesuffix(".npy"): _array(archive, member) for member in members}
+            facts = json.loads(arrays.pop(FACTS).tobytes())
+            version, task = facts["version"], int(facts["task"])
+        except Exception as error:  # zipfile, numpy and json raise some fifteen kinds
+            raise InputError(
+                f"{where}: not a checkpoint, or damaged ({error or type(error).__name__});"
+                " remove it to run its trains anew"
+            ) from None
+        if version != VERSION:
+            raise InputError(
+                f"{path}: checkpoint version = {version}: this program reads {VERSION}; remove it to run anew"
+            )
+        return cls(task, facts, arrays)
+
+    def check(self, where: str) -> None:
+        """Refuse facts with which no run can go on.
+
+        Args:
+            where: Name of the file.
+
+        Raises:
+            InputError: Names the fact.
+        """
+        for name, kind in NUMBERS.items():
+            value: Any = self.facts.get(name)
+            plain = type(value) is int or (kind is float and type(value) is float)
+            if not plain or not 0 <= value < 2**63:
+                rule = f"must be a {'whole ' * (kind is int)}number >= 0"
+                raise InputError(f"{where}: damaged: {name} = {str(value)[:80]}: {rule}")
+        rows = self.facts.get("rows")
+        if not isinstance(rows, dict) or not all(_is_rows(each) for each in rows.values()):
+            raise InputError(f"{where}: damaged: rows: must be numbers of samples by train and group")
+
+    @property
+    def foreign(self) -> list[str]:
+        """Packages of other versions than those that made it: the bits may differ."""
+        made_by = self.facts.get("made_by", {})
+        return [f"{name} {made_by.get(name)}" for name in MAKERS if made_by.get(name) != metadata.version(name)]
+
+
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
+    """One array, if it is no larger than what the file holds of it.
+
+    Raises:
+        ValueError: It claims to be, or is no plain array.
+    """
+    with archive.open(member) as file:
+        major = np.lib.format.read_magic(file)
+        read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[major]
+        shape, _, dtype = read(file)
+        if dtype.hasobject or math.prod(shape) * dtype.itemsize > member.file_size:
+            raise ValueError(f"{member.filename}: shape {shape} of {dtype}")
+    with archive.open(member) as file:
+        return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
+
+
+def _is_rows(rows: Any) -> bool:
+    return isinstance(rows, dict) and all(type(count) is int and 0 <= count < 2**63 for count in rows.values())

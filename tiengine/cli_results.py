@@ -1,0 +1,135 @@
+"""Commands that read results: ``tiengine info``, ``metrics``, ``plot``, ``report``; none of them needs Taichi to begin.
+
+:data:`COMMANDS` joins the group of :mod:`tiengine.cli`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tiengine.figures.catalogue import COMPARE, names
+from tiengine.input_files import parse_toml
+from tiengine.screen import SUMMARY, print_rows, summary
+
+__all__ = ["COMMANDS"]
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+def info(file: Path) -> None:
+    """Say what a result FILE holds and how it was made."""
+    from tiengine import results
+
+    with results.open(file) as result:
+        attributes = result.attributes
+        scenario = parse_toml(result.scenario_toml, f"{file}: scenario")
+        rows = [("scenario", str(scenario.get("name", "")))]
+        for section, key in (("train", "vehicles"), ("train", "speed_kmh"), ("train", "distance")):
+            table = scenario.get(section)
+            rows.append((f"{section}.{key}", _text(table.get(key)) if isinstance(table, dict) else ""))
+        hidden = {*SUMMARY, "scenario", "scenario_crc32"}
+        rows += [(key, str(value)) for key, value in attributes.items() if key not in hidden]
+        rows += summary(attributes)
+        for train in range(result.trains):
+            path = f"trains/{train:03d}"
+            rows += [(f"{path}/{group}", content) for group, content in _groups(result[path])]
+    print_rows(rows)
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--train", type=click.IntRange(0), help="One train of an ensemble; default: all, summarised.")
+@click.option("--json", "output", type=click.Path(path_type=Path), help="Write all indices here too, replacing a file.")
+def metrics(file: Path, train: int | None, output: Path | None) -> None:
+    """Indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 for a result FILE, beside their limits."""
+    from tiengine import metrics_table, profile_tables, results
+    from tiengine.output_file import check_output
+
+    if output is not None:
+        check_output(output, force=True)
+    with results.open(file) as result:
+        found = result.metrics(train)
+    if output is not None:
+        output.write_text(found.to_json() + "\n", encoding="utf-8")
+    profile_tables.show(metrics_table.metrics_table(found))
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Ends in .csv, .parquet or .mat.")
+@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Train of an ensemble.")
+@click.option("--channel", "channels", multiple=True, help="GROUP or GROUP/CHANNEL; may be repeated; default: wheel.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def export(file: Path, output: Path, train: int, channels: Sequence[str], force: bool) -> None:
+    """Write channels of a result FILE as CSV, Parquet or MATLAB (docs/results.md)."""
+    from tiengine import export as exporting
+    from tiengine import results
+
+    with results.open(file) as result:
+        written = exporting.export(result, output, train=train, channels=channels, force=force)
+    click.echo(f"{output}: {written}")
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("kind", type=click.Choice(names()), required=False)
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Figure (.png, .pdf, .svg) or folder.")
+@click.option("--with", "other", type=click.Path(path_type=Path), help="Second file, of kind compare.")
+@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="One train of an ensemble.")
+def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, train: int) -> None:
+    """Draw figures of a result FILE: one KIND, or all that it can give, into FILE_KIND.png; replaces figures."""
+    from tiengine import results
+    from tiengine.figures.files import draw_all, draw_one
+
+    with ExitStack() as stack:
+        result = stack.enter_context(results.open(file))
+        second = stack.enter_context(results.open(other)) if other is not None else None
+        if kind is None and second is None:
+            for name, words in draw_all(result, output, train):
+                click.echo(f"{name:<10}  {words}")
+        else:
+            click.echo(str(draw_one(result, kind or COMPARE.name, output, train, second)))
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Page to write, replacing one; FILE.html if none."
+)
+@click.option("--train", type=click.IntRange(0), help="Whose figures; default: the first that ran to its end.")
+def report(file: Path, output: Path | None, train: int | None) -> None:
+    """Make one HTML page of a result FILE: scenario, key figures, indices and figures; it needs no network."""
+    from tiengine import report as reporting
+    from tiengine import results
+
+    path = output or file.with_suffix(".html")
+    with results.open(file) as result:
+        reporting.write(result, path, train)
+    click.echo(str(path))
+
+
+def _text(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+
+
+def _groups(train: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Name of every group of a train, with its samples and channels."""
+    for name, group in train.items():
+        if not hasattr(group, "keys"):  # the train's own time is a dataset
+            continue
+        channels = {key: dataset for key, dataset in group.items() if "coordinates" in dataset.attrs}
+        if channels:
+            samples = next(iter(channels.values())).shape[0]
+            yield f"{prefix}{name}", f"{samples} samples of {', '.join(channels)}"
+        elif "event" in group:
+            yield f"{prefix}{name}", f"{group['event'].shape[0]} events"
+        else:
+            yield from _groups(group, f"{prefix}{name}/")
+
+
+COMMANDS = (info, metrics, plot, report, export)

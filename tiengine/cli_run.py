@@ -1,0 +1,184 @@
+"""Commands that simulate: ``tiengine run`` and ``tiengine resume``.
+
+Exit status 0: all trains came to their end; 1: a train failed; 2: bad input, or the disk is full; 128 + n: stopped by
+signal n (130 Ctrl-C, 143 SIGTERM), to be resumed.
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from tiengine.screen import print_rows, summary
+
+if TYPE_CHECKING:
+    from tiengine.results import Result
+
+__all__ = ["COMMANDS"]
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+_workers = click.option("--workers", type=click.IntRange(1), help="Processes for an ensemble; default: one a core.")
+_checkpoint = click.option(
+    "--checkpoint",
+    type=click.FloatRange(0.0, min_open=True),
+    default=60.0,
+    show_default=True,
+    help="Wall time between two checkpoints [s].",
+)
+_quiet = click.option("--quiet", is_flag=True, help="Print nothing but errors.")
+
+
+@click.command()
+@click.argument("scenario")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Result file; default: the scenario's name.")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key: train.speed_kmh=300")
+@_workers
+@_checkpoint
+@_quiet
+@click.option("--force", is_flag=True, help="Replace an existing result file.")
+def run(
+    scenario: str,
+    output: Path | None,
+    settings: Sequence[str],
+    workers: int | None,
+    checkpoint: float,
+    quiet: bool,
+    force: bool,
+) -> None:
+    """Simulate SCENARIO, the name of a built-in one or the path of a TOML file: one train or an ensemble."""
+    from tiengine.scenario import load_scenario
+
+    resolved = load_scenario(scenario, settings)
+    path = output or Path(f"{Path(resolved.name).name}.h5")
+
+    from tiengine.output_file import check_output
+
+    check_output(path, force)
+
+    from tiengine import simulate
+
+    _watched(
+        lambda **screen: simulate.run(resolved, path, force=force, workers=workers, checkpoint=checkpoint, **screen),
+        path,
+        resolved.name,
+        quiet,
+    )
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@_workers
+@_checkpoint
+@_quiet
+def resume(file: Path, workers: int | None, checkpoint: float, quiet: bool) -> None:
+    """Go on with a run that was stopped or killed: the result FILE gets the bits of a run without a break."""
+    from tiengine import simulate
+
+    _watched(
+        lambda **screen: simulate.resume(file, workers=workers, checkpoint=checkpoint, **screen),
+        file,
+        file.stem,
+        quiet,
+    )
+
+
+COMMANDS = (run, resume)
+
+
+def _watched(simulation: Callable[..., Result], path: Path, name: str, quiet: bool) -> None:
+    """Run with a bar on the screen; say how it ended."""
+    from tiengine.events import RunFailedError, RunStoppedError
+
+    console = Console(stderr=True, quiet=quiet, highlight=False)
+    with _stopped_by_signals(console) as stop:
+        try:
+            with _progress(console, name) as progress:
+                result = simulation(
+                    progress=progress, tell=lambda words: console.print(words, markup=False), stop=lambda: stop.asked
+                )
+        except RunStoppedError as stopped:
+            how = f"go on by: tiengine resume {path}" if path.exists() else "nothing was computed yet"
+            click.echo(f"{stopped}; {how}", err=True)
+            raise SystemExit(128 + stop.number) from None
+        except RunFailedError as failure:
+            click.echo(f"run failed: {failure}; {path} holds what was computed until then", err=True)
+            raise SystemExit(1) from None
+    with result:
+        if not quiet:
+            print_rows([*summary(result.attributes), ("result", str(path))])
+        failures = result.failures
+    for train, why in failures.items():
+        click.echo(f"train {train} failed: {why}", err=True)
+    if failures:
+        raise SystemExit(1)
+
+
+@dataclass
+class _Stop:
+    """Whether a signal has asked to stop, and which."""
+
+    number: int = 0
+
+    @property
+    def asked(self) -> bool:
+        return self.number > 0
+
+
+@contextmanager
+def _stopped_by_signals(console: Console) -> Iterator[_Stop]:
+    """Ctrl-C and SIGTERM ask to finish the chunk of steps; a second one ends the program at once."""
+    stop = _Stop()
+
+    def ask(number: int, frame: Any) -> None:
+        if stop.asked:
+            raise SystemExit(128 + number)
+        stop.number = number
+        console.print("stopping after these steps; once more to leave at once")
+
+    previous = {number: signal.signal(number, ask) for number in SIGNALS}
+    try:
+        yield stop
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _progress(console: Console, name: str) -> Iterator[Callable[[float, float], None]]:
+    """A bar with simulated time, ETA and real-time factor, as the callback of a run."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.2f} of {task.total:.2f} s"),
+        TextColumn("ETA"),
+        TimeRemainingColumn(),
+        TextColumn("RTF {task.fields[factor]:.2f}"),
+    )
+    bar = Progress(*columns, console=console, transient=not console.is_terminal)
+    task = bar.add_task(name, total=0.0, factor=0.0, start=False)
+    clock: list[float] = []  # the time of the first call: set-up is not part of the factor
+
+    def update(simulated_time: float, end_time: float) -> None:
+        if not clock:
+            clock.extend((time.perf_counter(), simulated_time))
+            bar.start()  # not before: a run refused at set-up leaves one line, its error
+            bar.start_task(task)
+        elapsed = time.perf_counter() - clock[0]
+        factor = elapsed / max(simulated_time - clock[1], 1e-9)
+        bar.update(task, completed=simulated_time, total=end_time, factor=factor)
+
+    try:
+        yield update
+    finally:
+        if clock:
+            bar.stop()

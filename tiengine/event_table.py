@@ -1,0 +1,65 @@
+"""The events of a train in its result file: one row each, columns as datasets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import h5py
+
+from tiengine.channels import Channel
+from tiengine.events import Event
+
+__all__ = ["EVENTS", "create_events", "event_columns"]
+
+EVENTS = "events"
+"""Name of the group."""
+
+CHUNK = 64  # rows kept together
+
+TEXT = h5py.string_dtype()
+
+COLUMNS = {
+    "event": ("i4", Channel("1", "number of the event")),
+    "time": ("f8", Channel("s", "time")),
+    "position": ("f8", Channel("m", "chainage of the first vehicle's centre")),
+    "kind": (TEXT, Channel("1", "derailment, flange_climb, wheel_lift, track_end or runaway")),
+    "wheelset": ("i4", Channel("1", "wheelset, 1 leads; 0 where it concerns none")),
+    "side": (TEXT, Channel("1", "left, right or nothing")),
+    "message": (TEXT, Channel("1", "what happened, in words")),
+    "stops": ("i1", Channel("1", "1 if it ended the train")),
+}
+
+
+def create_events(group: Any) -> None:
+    """Create the empty columns.
+
+    Args:
+        group: The group of the file.
+    """
+    for name, (dtype, meaning) in COLUMNS.items():
+        column = group.create_dataset(name, (0,), dtype, maxshape=(None,), chunks=(CHUNK,))
+        column.attrs["units"], column.attrs["long_name"] = meaning.units, meaning.long_name
+        if name == "event":
+            column.make_scale(name)
+        else:
+            column.dims[0].attach_scale(group["event"])
+
+
+def event_columns(events: Sequence[Event], first: int) -> dict[str, list[Any]]:
+    """Rows of the table.
+
+    Args:
+        events: What happened.
+        first: Number of the first of them.
+    """
+    return {
+        "event": list(range(first, first + len(events))),
+        "time": [event.time for event in events],
+        "position": [event.position for event in events],
+        "kind": [event.kind for event in events],
+        "wheelset": [event.wheelset for event in events],
+        "side": [event.side for event in events],
+        "message": [event.words for event in events],
+        "stops": [int(event.stops) for event in events],
+    }

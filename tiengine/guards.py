@@ -1,0 +1,219 @@
+"""What can go wrong with the physics of a run: looked for every millisecond of simulated time.
+
+Numbers that run away end a train. A derailment, a flange that climbs, a wheel that stays off its rail and a measured
+track that ends are events: they go into the file and onto the screen, and the scenario says whether they end the train.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.channels import DOFS, SIDES
+from tiengine.contact_geometry import ContactTable
+from tiengine.events import EVENT_KINDS, Event, Events
+from tiengine.kernels import layout as at
+from tiengine.kernels.wheel_rail import SHIFT
+from tiengine.stepper import Stepper
+
+__all__ = ["Guard", "Watch"]
+
+EVERY = 1e-3
+"""Simulated time between two looks [s]."""
+
+LIMITS = {at.U: 10.0, at.V: 1e3, at.A: 1e7}
+"""Largest coordinate [m, rad], rate and acceleration that a track or a train can have and still be one: a flat of
+the wheel accelerates a slab by some 1e3 m/s^2 and no body moves by metres."""
+
+STEEPEST = 0.98
+"""A flange climbs where its slope falls below this part of the steepest; the straight flank varies by 1 %."""
+
+QUIET = 1.0
+"""A wheel's event is not reported again within this time [s]."""
+
+
+@dataclass(eq=False)
+class Watch:
+    """What the guard remembers from look to look; a checkpoint saves it.
+
+    Attributes:
+        lifted: How long each wheel has carried nothing [s], shape (B, W, 2).
+        last: When a wheel was last seen in each kind of trouble [s], shape (kinds of wheels, B, W, 2).
+        ended: Whether the end of the measured track was passed, shape (B,).
+    """
+
+    lifted: NDArray[np.float64]
+    last: NDArray[np.float64]
+    ended: NDArray[np.bool_]
+
+    @classmethod
+    def fresh(cls, trains: int, wheelsets: int) -> Watch:
+        """Nothing has happened yet."""
+        wheels = (trains, wheelsets, 2)
+        return cls(np.zeros(wheels), np.full((3, *wheels), -np.inf), np.zeros(trains, dtype=np.bool_))
+
+
+@dataclass(eq=False)
+class Guard:
+    """Looks at the state of trains between steps.
+
+    Attributes:
+        stepper: Whose state is looked at.
+        policy: Of the scenario.
+        track_end: Chainage where each train's measured track ends [m], infinite without, shape (B,).
+        watch: What is remembered.
+        found: Events since they were last taken, by place of the train.
+        stopped: Number of the step in which a train was stopped, by its place.
+    """
+
+    stepper: Stepper
+    policy: Events
+    track_end: NDArray[np.float64]
+    watch: Watch
+    found: dict[int, list[Event]] = field(default_factory=dict)
+    stopped: dict[int, int] = field(default_factory=dict)
+
+    @classmethod
+    def beside(cls, stepper: Stepper, policy: Events, track_end: NDArray[np.float64]) -> Guard:
+        """A guard that has seen nothing yet, as a last stage of the stepper.
+
+        Args:
+            stepper: Is watched.
+            policy: Of the scenario.
+            track_end: See the class.
+        """
+        dims = stepper.model.dims
+        guard = cls(stepper, policy, track_end, Watch.fresh(int(dims[at.TRAINS]), int(dims[at.WHEELSETS])))
+        stepper.stages = (*stepper.stages, ("guards", guard.watch_step))
+        return guard
+
+    def __post_init__(self) -> None:
+        """Keep what every look needs."""
+        self.model, self.state = self.stepper.model, self.stepper.state
+        self._done, self._position = 0, np.zeros(0)
+        self.every = max(int(EVERY / self.model.given.newmark.dt + 1e-9), 1)
+        self._rows = [(self.state.motion[row], limit * limit) for row, limit in LIMITS.items()]
+        self._shift, self._normal = self.state.contact[..., SHIFT], self.state.force[..., 0]
+        table = self.model.given.contact
+        self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
+        self._wheel_front = float(self.model.given.train.wheelset_x.max())
+        self._nearest_end = float(self.track_end.min())
+
+    def load(self, done: int, position: NDArray[np.float64]) -> None:
+        """Know the coming steps.
+
+        Args:
+            done: Steps before them.
+            position: Chainage of the first vehicle's centre at the end of each [m], shape (steps,).
+        """
+        self._done, self._position = done, position
+
+    def watch_step(self) -> None:
+        """Look at the end of a step if it is time to, and after the last that is known."""
+        i = self.stepper.asked[0]
+        step = self._done + i + 1
+        if step % self.every == 0 or i + 1 == len(self._position):
+            self.look(step, float(self._position[i]))
+
+    def look(self, step: int, position: float) -> None:
+        """Look at the state after a step.
+
+        Args:
+            step: Its number, from 1.
+            position: Chainage of the first vehicle's centre [m].
+        """
+        time = step * self.model.given.newmark.dt
+        if not all(float(np.dot(row, row)) < limit for row, limit in self._rows):  # not a number is not less, either
+            self._runaway(step, time, position)
+        carried = self._normal > 0.0
+        self.watch.lifted += self.every * self.model.given.newmark.dt
+        self.watch.lifted[carried] = 0.0
+        climbs = self._shift > self._climb
+        if climbs.any():
+            shift = f"beyond {self._climb * 1e3:.1f} mm"
+            self._wheels(1, climbs & carried, step, time, position, f"climbs on its flange: lateral shift {shift}")
+            words = f"derailed: lateral shift beyond {self._derailed * 1e3:.1f} mm on the flange side"
+            self._wheels(0, self._shift > self._derailed, step, time, position, words)
+        lasting = self.watch.lifted >= self.policy.wheel_lift_time
+        if lasting.any():
+            self._wheels(2, lasting, step, time, position, f"off the rail for {self.policy.wheel_lift_time:g} s")
+        if position + self._wheel_front > self._nearest_end:
+            self._track_ends(step, time, position)
+
+    def take(self) -> dict[int, list[Event]]:
+        """Events since the last call, by place of the train."""
+        found, self.found = self.found, {}
+        return found
+
+    def _report(self, train: int, step: int, event: Event) -> None:
+        """Note an event of a train that still runs."""
+        if train in self.stopped:
+            return
+        self.found.setdefault(train, []).append(event)
+        if event.stops:
+            self.stopped[train] = step
+
+    def _wheels(self, kind: int, wrong: NDArray[np.bool_], step: int, time: float, position: float, words: str) -> None:
+        """Report wheels in trouble, each at the beginning of it."""
+        name, last = EVENT_KINDS[kind], self.watch.last[kind]
+        stops = getattr(self.policy, name) == "stop"
+        for train, wheelset, side in np.argwhere(wrong & (last < time - QUIET)):
+            sentence = f"wheelset {wheelset + 1} {SIDES[side]} {words}"
+            self._report(int(train), step, Event(name, time, position, int(wheelset) + 1, SIDES[side], sentence, stops))
+        last[wrong] = time
+
+    def _track_ends(self, step: int, time: float, position: float) -> None:
+        for train in np.flatnonzero((position + self._wheel_front > self.track_end) & ~self.watch.ended):
+            self.watch.ended[train] = True
+            words = f"the measured track ends at chainage {self.track_end[train]:.2f} m; it is smooth from there"
+            stops = self.policy.track_end == "stop"
+            self._report(int(train), step, Event("track_end", time, position, 0, "", words, stops))
+
+    def _runaway(self, step: int, time: float, position: float) -> None:
+        """Say which trains' numbers have run away, and what of them first."""
+        for train in range(int(self.model.dims[at.TRAINS])):
+            worst, what = max(self._excess(train), key=lambda found: found[0])
+            if worst < 1.0:
+                continue
+            shorter = 0.5 * self.model.given.newmark.dt
+            words = (
+                f"numbers ran away, first of {what}; try numerics.time_step = {shorter:g}, more passes, or look at the"
+                " irregularity there"
+            )
+            self._report(train, step, Event("runaway", time, position, 0, "", words, True))
+            self.state.clear(train)
+
+    def _excess(self, train: int) -> list[tuple[float, str]]:
+        """Largest coordinate over its limit, and its words, of every part of a train."""
+        found = []
+        with np.errstate(over="ignore", invalid="ignore"):
+            for block in ("vehicles", "vertical", "lateral", "slabs"):
+                rows = np.stack([np.abs(self.state.view(row, block)[train]) / limit for row, limit in LIMITS.items()])
+                rows[~np.isfinite(rows)] = np.inf
+                place = np.unravel_index(int(rows.argmax()), rows.shape)[1:]
+                found.append((float(rows.max()), self._words(block, [int(i) for i in place])))
+        return found
+
+    def _words(self, block: str, place: list[int]) -> str:
+        """A coordinate in words."""
+        if block == "slabs":
+            slots, rear = self.state.design.shape[1], self.state.first_slab
+            return f"slab {rear + (place[0] - rear) % slots}"
+        if block == "vehicles":
+            bodies = self.model.given.train.body_names
+            body, dof = divmod(place[0], len(DOFS))
+            return f"body {bodies[body]} ({DOFS[dof]})" if body < len(bodies) else "a damper in series with its spring"
+        return f"the {SIDES[place[0]]} rail, {block}ly"
+
+
+def climbing_shift(table: ContactTable) -> float:
+    """Lateral shift at which a wheel without tilt has passed the steepest part of its flange [m].
+
+    Args:
+        table: Contact geometry.
+    """
+    slope = table.values[:, table.values.shape[1] // 2, at.TAN_GAMMA]
+    steep = np.flatnonzero(slope >= STEEPEST * slope.max())
+    return float(table.u_min + min(int(steep[-1]) + 1, len(slope) - 2) * table.du)
