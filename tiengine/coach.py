@@ -18,13 +18,14 @@ from tiengine.connector import (
     Damping,
     Forces,
     RollStiffness,
+    SeriesSprings,
     Spring,
     Stiffness,
     Stop,
     check_damper,
     check_stop,
 )
-from tiengine.quantity import Params, Q
+from tiengine.quantity import Name, Params, Q, Source
 
 __all__ = ["Coach", "expand"]
 
@@ -35,7 +36,19 @@ _SIDES = ((-1.0, "left"), (1.0, "right"))
 
 
 class Geometry(Params):
-    """Main dimensions."""
+    """Main dimensions; spans are lateral, from the centre line.
+
+    Attributes:
+        wheel_radius: At the tape circle.
+        half_bogie_centres: Half the distance of the bogies' centres.
+        half_wheelbase: Half the distance of a bogie's axles.
+        half_span_primary: Of the primary springs.
+        half_span_secondary: Of the secondary springs.
+        half_span_contact: Of the tape circles.
+        length_over_couplers: Pitch of the vehicles of a train.
+        height_frame_cg: Centre of gravity of a frame above the rail.
+        height_car_cg: Centre of gravity of the car body above the rail.
+    """
 
     wheel_radius: _Span
     half_bogie_centres: _Span
@@ -52,7 +65,14 @@ class Geometry(Params):
 
 
 class Inertia(Params):
-    """Mass and moments of inertia of a body."""
+    """Mass and moments of inertia of a body.
+
+    Attributes:
+        mass: Mass.
+        Jx: Roll inertia.
+        Jy: Pitch inertia; of a wheelset its spin inertia.
+        Jz: Yaw inertia.
+    """
 
     mass: Annotated[float, Q("kg", gt=0)]
     Jx: Annotated[float, Q("kg m^2", gt=0)]
@@ -61,7 +81,16 @@ class Inertia(Params):
 
 
 class Suspension(Params):
-    """Spring and damper in parallel, per axle box or per air spring."""
+    """Spring and damper in parallel, per axle box or per air spring.
+
+    Attributes:
+        kx: Longitudinal stiffness.
+        ky: Lateral stiffness.
+        kz: Vertical stiffness.
+        cx: Longitudinal damping.
+        cy: Lateral damping.
+        cz: Vertical damping.
+    """
 
     kx: Stiffness
     ky: Stiffness
@@ -78,7 +107,13 @@ class Secondary(Suspension):
 
 
 class PrimaryNode(Params):
-    """Bush of the axle-box arm, in parallel with the primary spring, per axle box."""
+    """Bush of the axle-box arm, in parallel with the primary spring, per axle box.
+
+    Attributes:
+        x_from_bogie_centre: Along the track.
+        kx: Longitudinal stiffness.
+        ky: Lateral stiffness.
+    """
 
     x_from_bogie_centre: _Span
     height: _Height
@@ -87,7 +122,14 @@ class PrimaryNode(Params):
 
 
 class Curve(Params):
-    """Damper table: slopes c from the rates v, or points (v, F); k_series is the spring of its ends."""
+    """Damper table: slopes c from the rates v on, or points (v, F).
+
+    Attributes:
+        v: Rates.
+        c: Slopes from these rates on.
+        F: Forces at these rates.
+        k_series: Stiffness of the spring of its ends, 0 for none.
+    """
 
     v: _Rates = (0.0,)
     c: tuple[Damping, ...] = ()
@@ -106,13 +148,23 @@ class Curve(Params):
 
 
 class PrimaryDamper(Curve):
-    """Vertical damper, per axle box; over the axle by default."""
+    """Vertical damper, per axle box.
+
+    Attributes:
+        x_from_bogie_centre: Along the track; over the axle without it.
+    """
 
     x_from_bogie_centre: _Span | None = None
 
 
 class YawDamper(Curve):
-    """Longitudinal damper, one a side and bogie; at the secondary springs' planes by default."""
+    """Longitudinal damper, one a side and bogie.
+
+    Attributes:
+        half_span: Lateral, from the centre line.
+        height_frame: Above the rail; the secondary springs' lower plane without it.
+        height_car: Above the rail; the secondary springs' upper plane without it.
+    """
 
     half_span: _Span
     height_frame: _Height | None = None
@@ -120,7 +172,13 @@ class YawDamper(Curve):
 
 
 class LateralDamper(Curve):
-    """Lateral damper, two a bogie, at +x and -x; in the secondary springs' planes at x = 0 by default."""
+    """Lateral damper, two a bogie, at +x and -x.
+
+    Attributes:
+        x_from_bogie_centre: Along the track.
+        height_frame: Above the rail; the secondary springs' lower plane without it.
+        height_car: Above the rail; the secondary springs' upper plane without it.
+    """
 
     x_from_bogie_centre: Annotated[float, Q("m", ge=0)] = 0.0
     height_frame: _Height | None = None
@@ -128,7 +186,12 @@ class LateralDamper(Curve):
 
 
 class LateralStop(Params):
-    """Bump stop between car and frame at the bogie's centre, points (x, F) of either side."""
+    """Bump stop between car and frame at the bogie's centre, points (x, F) of either side.
+
+    Attributes:
+        x: Elongations.
+        F: Forces at these elongations.
+    """
 
     height: _Height
     x: tuple[Annotated[float, Q("m", ge=0)], ...]
@@ -141,7 +204,11 @@ class LateralStop(Params):
 
 
 class TractionRod(Params):
-    """Longitudinal spring at the bogie's centre."""
+    """Longitudinal spring at the bogie's centre.
+
+    Attributes:
+        kx: Longitudinal stiffness.
+    """
 
     kx: Stiffness
     height_frame: _Height
@@ -149,17 +216,28 @@ class TractionRod(Params):
 
 
 class AntiRoll(Params):
-    """Torsion bar between car and frame, per bogie."""
+    """Torsion bar between car and frame, per bogie.
+
+    Attributes:
+        k: Stiffness against roll.
+    """
 
     k: RollStiffness
 
 
 class Coach(Params):
-    """A coach on two two-axle bogies, and extras in the general form."""
+    """A coach on two two-axle bogies, and extras in the general form.
 
-    name: str
-    source: str = ""
-    series_springs: bool = False
+    Attributes:
+        body: Extra bodies.
+        spring: Extra springs.
+        damper: Extra dampers.
+        stop: Extra stops.
+    """
+
+    name: Name
+    source: Source = ""
+    series_springs: SeriesSprings = False
     geometry: Geometry
     car: Inertia
     frame: Inertia

@@ -17,15 +17,16 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from tiengine.quantity import Params, Q
+from tiengine.quantity import Name, Params, Q
 
 __all__ = [
     "Body",
     "Damper",
     "Direction",
     "Joint",
+    "SeriesSprings",
     "Spring",
     "Stop",
     "check_damper",
@@ -41,20 +42,21 @@ Damping = Annotated[float, Q("N s/m", ge=0)]
 RollStiffness = Annotated[float, Q("N m/rad", ge=0)]
 Forces = tuple[Annotated[float, Q("N", ge=0)], ...]
 Direction = Literal["x", "y", "z"]
+SeriesSprings = Annotated[bool, Field(description="springs in series with dampers (k_series) get states of their own")]
 
 
 class Body(Params):
     """Rigid body with its principal axes along x, y, z; a wheelset spins."""
 
-    name: str
-    mass: Annotated[float, Q("kg", gt=0)]
+    name: Annotated[str, Field(description="what connectors call it")]
+    mass: Annotated[float, Q("kg", "mass", gt=0)]
     Jx: Annotated[float, Q("kg m^2", "roll inertia", gt=0)]
     Jy: Annotated[float, Q("kg m^2", "pitch inertia; of a wheelset its spin inertia", gt=0)]
     Jz: Annotated[float, Q("kg m^2", "yaw inertia", gt=0)]
     x: Annotated[float, Q("m", "centre of gravity, forward of the vehicle's centre")] = 0.0
     y: Annotated[float, Q("m", "centre of gravity, right of the centre line")] = 0.0
     height: Annotated[float, Q("m", "centre of gravity above the rail", ge=0)]
-    wheelset: bool = False
+    wheelset: Annotated[bool, Field(description="it rolls on the rails and spins")] = False
 
     def local(self, point: Point) -> tuple[float, float, float]:
         """(X, Y, Z) from the centre of gravity to a point of the vehicle (x, y, height) [m]."""
@@ -64,15 +66,27 @@ class Body(Params):
 class Joint(Params):
     """What every connector has: two bodies and a point of each (x, y, height above the rail) [m]."""
 
-    name: str = ""
-    a: str
-    b: str
-    point_a: Point
-    point_b: Point
+    name: Name = ""
+    a: Annotated[str, Field(description="one body")]
+    b: Annotated[str, Field(description="the other body")]
+    point_a: Annotated[Point, Field(description="where it holds a: x, y, height above the rail")]
+    point_b: Annotated[Point, Field(description="where it holds b: x, y, height above the rail")]
 
 
 class Spring(Joint):
-    """Linear spring and damper in parallel, in the three directions, with bending and torsion."""
+    """Linear spring and damper in parallel, in the three directions, with bending and torsion.
+
+    Attributes:
+        kx: Longitudinal stiffness.
+        ky: Lateral stiffness.
+        kz: Vertical stiffness.
+        cx: Longitudinal damping.
+        cy: Lateral damping.
+        cz: Vertical damping.
+        k_roll: Stiffness against roll between the bodies.
+        k_pitch: Stiffness against pitch.
+        k_yaw: Stiffness against yaw.
+    """
 
     kx: Stiffness = 0.0
     ky: Stiffness = 0.0
@@ -100,6 +114,13 @@ class Damper(Joint):
 
     Either slopes ``c[i]`` from the rates ``v[i]`` on (``v[0] = 0``), or points (v, F) from (0, 0) on. Beyond
     the last point the last slope goes on: repeat the last force to saturate.
+
+    Attributes:
+        direction: Along which it acts.
+        v: Rates.
+        c: Slopes from these rates on.
+        F: Forces at these rates.
+        k_series: Stiffness of the spring in series, 0 for none.
     """
 
     direction: Direction
@@ -126,6 +147,11 @@ class Stop(Joint):
     """Spring along one direction, odd in its elongation, by points (x, F); no force below a gap x[0] > 0.
 
     Beyond the last point the last slope goes on.
+
+    Attributes:
+        direction: Along which it acts.
+        x: Elongations.
+        F: Forces at these elongations.
     """
 
     direction: Direction

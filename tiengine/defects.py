@@ -21,14 +21,19 @@ __all__ = ["FailedFastenings", "MortarDefect", "check_defects", "fastening_facto
 
 SIDES = {"left": (0,), "right": (1,), "both": (0, 1)}
 
+MOST_VOIDS = 100  # of one slab
+
 SeatIndex = Annotated[int, Field(ge=0)]
 
 
 class FailedFastenings(Params):
     """A row of neighbouring fastenings of one rail or both, scaled by a factor."""
 
-    rail: Literal["left", "right", "both"] = "both"
-    seats: tuple[SeatIndex, SeatIndex]
+    rail: Annotated[Literal["left", "right", "both"], Field(description="which rail's")] = "both"
+    seats: Annotated[
+        tuple[SeatIndex, SeatIndex],
+        Field(description="first and last; seat j stands at (j + 1/2) seat pitches"),
+    ]
     factor: Annotated[float, Q("-", "0 failed, below 1 degraded; scales stiffness and damping", ge=0, le=10)] = 0.0
 
 
@@ -38,9 +43,9 @@ class MortarDefect(Params):
     x is measured from the slab's rear edge, y from its centre line, positive to the right.
     """
 
-    slab: Annotated[int, Field(ge=0)]
-    x: tuple[float, float]
-    y: tuple[float, float]
+    slab: Annotated[int, Q("-", "slab i lies between i and i + 1 slab pitches", ge=0)]
+    x: Annotated[tuple[float, float], Field(description="from, to", json_schema_extra={"unit": "m"})]
+    y: Annotated[tuple[float, float], Field(description="from, to", json_schema_extra={"unit": "m"})]
     factor: Annotated[float, Q("-", "0 void, 1 sound; scales stiffness and damping", ge=0, le=10)] = 0.0
 
     @property
@@ -100,8 +105,16 @@ def check_defects(
             raise InputError(f"{where}.slab = {void.slab}: must be between 0 and {last_slab}, the last of this run")
         _check_span(f"{where}.x", void.x, 0.0, slab.length, "the slab's length")
         _check_span(f"{where}.y", void.y, -slab.width / 2, slab.width / 2, "the slab's width")
-    for index in {void.slab for void in voids}:  # refuses voids that overlap
-        bed_factors(slab.length, slab.width, (1, 1), [v.rectangle for v in voids if v.slab == index])
+    by_slab: dict[int, list[MortarVoid]] = {}
+    for void in voids:
+        by_slab.setdefault(void.slab, []).append(void.rectangle)
+    for rectangles in by_slab.values():
+        if len(rectangles) > MOST_VOIDS:
+            index = rectangles[0].slab
+            raise InputError(
+                f"track.mortar_voids: {len(rectangles)} of slab {index}: must be at most {MOST_VOIDS} a slab"
+            )
+        bed_factors(slab.length, slab.width, (1, 1), rectangles)  # refuses voids that overlap
 
 
 def _check_span(where: str, span: tuple[float, float], low: float, high: float, what: str) -> None:

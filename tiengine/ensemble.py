@@ -16,6 +16,7 @@ the output, and the threads of the process that computes them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Any
 
@@ -27,6 +28,9 @@ __all__ = ["Ensemble"]
 
 VARIABLE = ("train", "track", "irregularity", "contact", "numerics")
 SHARED = ("numerics.threads",)
+
+MOST_DIFFERENT = 5000
+"""Trains of one ensemble that differ in more than their seed: each takes some 10 ms to build and check."""
 
 Seed = Annotated[int, Q("-", "names a realisation", ge=0, le=2**63 - 1)]
 
@@ -54,8 +58,12 @@ class Ensemble(Params):
     """
 
     size: Annotated[int, Q("-", "trains", ge=1, le=100_000)] = 1
-    seeds: tuple[Seed, ...] = ()
-    vary: Annotated[dict[str, tuple[Any, ...]], BeforeValidator(_flat)] = Field(default_factory=dict)
+    seeds: Annotated[tuple[Seed, ...], Field(description="one a train")] = ()
+    vary: Annotated[
+        dict[str, tuple[Any, ...]],
+        BeforeValidator(_flat),
+        Field(description="lists of values by key; train i takes entry i, shorter lists are repeated in turn"),
+    ] = Field(default_factory=dict)
 
     @field_validator("seeds")
     @classmethod
@@ -80,9 +88,17 @@ class Ensemble(Params):
                     f"ensemble.vary: {key!r} has {len(entries)} values: must be as many as trains, {size},"
                     " or a number that divides it"
                 )
+        different = math.lcm(*map(len, vary.values()))
+        if different > MOST_DIFFERENT:
+            raise InputError(f"ensemble.vary: {different} different trains: must be at most {MOST_DIFFERENT}")
         if "irregularity.seed" in vary and info.data.get("seeds"):
             raise InputError("ensemble.vary: 'irregularity.seed' cannot vary where ensemble.seeds is given")
         return vary
+
+    @property
+    def different(self) -> int:
+        """Trains, from the first on, after which the values that vary begin again."""
+        return math.lcm(*map(len, self.vary.values()))
 
     def changes(self, train: int) -> dict[str, Any]:
         """Values of the keys that vary, of one train.

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.quantity import Params, Q
+from tiengine.quantity import Name, Params, Q, Source
 
 __all__ = ["Fastening", "seat_count", "seat_tables"]
 
@@ -15,8 +15,8 @@ __all__ = ["Fastening", "seat_count", "seat_tables"]
 class Fastening(Params):
     """Spring and damper of one rail seat."""
 
-    name: str = "fastening"
-    source: str = ""
+    name: Name = "fastening"
+    source: Source = ""
     vertical_stiffness: Annotated[float, Q("N/m", "k_v, both half springs together", gt=0)]
     lateral_stiffness: Annotated[float, Q("N/m", "k_l", gt=0)]
     vertical_damping: Annotated[float, Q("N s/m", "c_v", ge=0)]

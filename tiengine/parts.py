@@ -18,23 +18,26 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
 from tiengine.fastening import Fastening
+from tiengine.input_files import numbers_of
 from tiengine.mortar import Mortar
-from tiengine.presets import KINDS, find_preset, load_toml, nearest
+from tiengine.presets import KINDS, LONGEST_PATH, find_preset, load_toml, nearest
 from tiengine.profile import ROUNDING_LENGTH, Profile
-from tiengine.profile_files import read_profile
+from tiengine.profile_files import MOST_POINTS, read_profile
 from tiengine.profile_frame import placed
-from tiengine.quantity import InputError, Params, Q, build
+from tiengine.quantity import InputError, Name, Params, Q, Source, build
 from tiengine.rail import Rail
 from tiengine.slab import Slab
 from tiengine.vehicle import Vehicle, vehicle_from_table
 
 if TYPE_CHECKING:
-    from tiengine.scenario import Track, Train
+    from tiengine.sections import Track, Train
 
 __all__ = ["Part", "Parts", "Presets", "build_parts", "collect_presets"]
 
 
 def _check_part(value: Any) -> Any:
+    if isinstance(value, str) and len(value) > LONGEST_PATH:
+        raise ValueError(f"must have at most {LONGEST_PATH} characters")
     if not isinstance(value, str | dict) or not value:
         raise ValueError("must be the name of a preset, the path of a file, or a table")
     return value
@@ -50,10 +53,10 @@ Presets = dict[str, dict[str, dict[str, Any]]]
 class ProfilePoints(Params):
     """A wheel's or a rail's profile as a table."""
 
-    name: str = "profile"
-    source: str = ""
+    name: Name = "profile"
+    source: Source = ""
     points: Annotated[str, Field(description="y and z in mm, a pair a line")]
-    has_cant: bool = False
+    has_cant: Annotated[bool, Field(description="a rail's points are those of a rail already inclined")] = False
     smoothing: Annotated[float, Q("m", "length of the smoothing spline", ge=0, le=5e-3)] = ROUNDING_LENGTH
     mirror: Annotated[bool | None, Field(description="a rail's gauge face is at positive y")] = None
     tape_circle: Annotated[float, Q("m", "outward from the points' y = 0; of a wheel", ge=-0.2, le=0.2)] = 0.0
@@ -119,6 +122,8 @@ def collect_presets(train: Train, track: Track, presets: Presets, folder: Path |
         tables = found.setdefault(kind, {})
         seen: set[Any] = set()
         while name is not None:  # a preset may itself start from another one
+            if not isinstance(name, str):
+                raise InputError(f"{where}.like = {str(name)[:80]}: must be the name of a preset or the path of a file")
             if name in seen:
                 raise InputError(f"{where} = {name!r}: is like itself")
             seen.add(name)
@@ -214,11 +219,12 @@ def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 def _profile(table: dict[str, Any], where: str, kind: Literal["wheel", "rail"]) -> Profile:
     given = build(ProfilePoints, table, where)
-    rows = [line.replace(",", " ").replace(";", " ").split() for line in given.points.strip().splitlines()]
-    try:
-        points = np.array([[float(y), float(z)] for y, z in rows]).reshape(-1, 2)
-    except ValueError:
-        raise InputError(f"{where}: every line of its points must hold two numbers, y and z in mm") from None
+    rows = [numbers_of(line.replace(",", " ").replace(";", " ").split()) for line in given.points.strip().splitlines()]
+    if len(rows) > MOST_POINTS:
+        raise InputError(f"{where}: {len(rows)} points; at most {MOST_POINTS} expected")
+    if not all(row is not None and len(row) == 2 for row in rows):
+        raise InputError(f"{where}: every line of its points must hold two numbers, y and z in mm")
+    points = np.array(rows, dtype=np.float64).reshape(-1, 2)
     points = placed(
         points,
         kind,

@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.special import zeta
 
-from tiengine.quantity import Params, Q
+from tiengine.quantity import Name, Params, Q, Source
 
 __all__ = ["Rail", "RailWindow", "sine_products"]
 
@@ -26,14 +26,14 @@ __all__ = ["Rail", "RailWindow", "sine_products"]
 class Rail(Params):
     """Section and material of a rail; y is its lateral axis, z the vertical one."""
 
-    name: str = "rail"
-    source: str = ""
-    mass_per_length: Annotated[float, Q("kg/m", gt=0)]
+    name: Name = "rail"
+    source: Source = ""
+    mass_per_length: Annotated[float, Q("kg/m", "mass per length", gt=0)]
     A: Annotated[float, Q("m^2", "area", gt=0)]
-    E: Annotated[float, Q("Pa", gt=0)]
+    E: Annotated[float, Q("Pa", "Young's modulus", gt=0)]
     nu: Annotated[float, Q("-", "Poisson's ratio", ge=0, lt=0.5)]
-    G: Annotated[float, Q("Pa", gt=0)]
-    rho: Annotated[float, Q("kg/m^3", gt=0)]
+    G: Annotated[float, Q("Pa", "shear modulus", gt=0)]
+    rho: Annotated[float, Q("kg/m^3", "density", gt=0)]
     Iy: Annotated[float, Q("m^4", "vertical bending", gt=0)]
     Iz: Annotated[float, Q("m^4", "lateral bending", gt=0)]
     I_polar: Annotated[float, Q("m^4", "Iy + Iz, torsional inertia", gt=0)]

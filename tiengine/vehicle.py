@@ -13,12 +13,13 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from tiengine.coach import Coach, expand
-from tiengine.connector import Body, Damper, Spring, Stop
-from tiengine.presets import find_preset, load_toml, nearest, preset_names, to_tuples
-from tiengine.quantity import InputError, Params, Q, build
+from tiengine.connector import Body, Damper, SeriesSprings, Spring, Stop
+from tiengine.input_files import to_tuples
+from tiengine.presets import find_preset, load_toml, nearest, preset_names
+from tiengine.quantity import InputError, Name, Params, Q, Source, build
 
 __all__ = ["Vehicle", "load_vehicle", "vehicle_from_table", "vehicle_names"]
 
@@ -26,16 +27,16 @@ __all__ = ["Vehicle", "load_vehicle", "vehicle_from_table", "vehicle_names"]
 class Vehicle(Params):
     """Rigid bodies joined by springs, dampers and stops."""
 
-    name: str
-    source: str = ""
+    name: Name
+    source: Source = ""
     wheel_radius: Annotated[float, Q("m", "r0", gt=0)]
     half_span_contact: Annotated[float, Q("m", "b0, half distance of the tape circles", gt=0)]
     length_over_couplers: Annotated[float, Q("m", "default pitch of the vehicles of a train", gt=0)]
-    series_springs: bool = False
-    body: tuple[Body, ...]
-    spring: tuple[Spring, ...] = ()
-    damper: tuple[Damper, ...] = ()
-    stop: tuple[Stop, ...] = ()
+    series_springs: SeriesSprings = False
+    body: Annotated[tuple[Body, ...], Field(description="tables")]
+    spring: Annotated[tuple[Spring, ...], Field(description="tables")] = ()
+    damper: Annotated[tuple[Damper, ...], Field(description="tables")] = ()
+    stop: Annotated[tuple[Stop, ...], Field(description="tables")] = ()
 
     @model_validator(mode="after")
     def _check(self) -> Vehicle:
@@ -113,7 +114,7 @@ def vehicle_from_table(table: Mapping[str, Any], where: str = "vehicle") -> Vehi
     Raises:
         InputError: Unknown key, missing key, or a value that breaks a rule.
     """
-    table = {key: to_tuples(value) for key, value in table.items()}
+    table = {key: to_tuples(value, f"{where}.{key}") for key, value in table.items()}
     if "geometry" in table:
         table = expand(build(Coach, table, where))
     return build(Vehicle, table, where)

@@ -1,0 +1,97 @@
+"""Results as xarray datasets: coordinates, units and long names as in the file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tiengine.quantity import InputError
+
+if TYPE_CHECKING:
+    import h5py
+    import xarray
+
+    from tiengine.results import Result
+
+__all__ = ["open_dataset", "stacked_dataset"]
+
+ALONG_TRACK = ("time", "seat", "slab")
+"""Dimensions of which trains may have done different stretches; what one of them has not is not a number."""
+
+
+def open_dataset(result: Result, file: h5py.File, group: str, train: int) -> xarray.Dataset:
+    """One group of one train; a channel is read when its values are asked for, while the result is open.
+
+    Args:
+        result: Open result.
+        file: Its file.
+        group: ``"wheel"``, ``"gauges/bridge"``.
+        train: Index of the train.
+
+    Raises:
+        InputError: There is no such train or group, or a package is missing.
+    """
+    xr, h5netcdf = _packages()
+    facts = result.facts(train)
+    path = f"trains/{train:03d}/{group}"
+    if not hasattr(result[path], "keys"):
+        raise InputError(f"{result.name}: {path!r} is a channel; name its group")
+    store = xr.backends.H5NetCDFStore(h5netcdf.File(file, "r"), group=path)
+    dataset: xarray.Dataset = xr.open_dataset(store, decode_times=False)
+    return dataset.assign_attrs(train=train, file=result.name, **facts)
+
+
+def stacked_dataset(result: Result, file: h5py.File, group: str) -> xarray.Dataset:
+    """One group of all trains, read into memory, with the dimension ``train``.
+
+    Trains that ran a shorter way are filled with "not a number". A train that failed before its first sample is left
+    out. Each train's seed and status come as coordinates.
+
+    Args:
+        result: Open result.
+        file: Its file.
+        group: As of :func:`open_dataset`.
+
+    Raises:
+        InputError: No train has such a group, or trains differ in vehicles, time step or gauges.
+    """
+    xr, _ = _packages()
+    held = [train for train in range(result.trains) if f"trains/{train:03d}/{group}" in file]
+    if not held:
+        raise InputError(f"{result.name}: no train has a group {group!r}")
+    sets = [open_dataset(result, file, group, train).load() for train in held]
+    for train, dataset in zip(held, sets, strict=True):
+        _check_alike(f"{result.name}: trains {held[0]} and {train}", sets[0], dataset)
+    index = xr.Variable("train", np.array(held))
+    stacked: xarray.Dataset = xr.concat(
+        sets, index, data_vars="all", coords="different", compat="equals", join="outer", combine_attrs="drop_conflicts"
+    )
+    facts = [result.facts(train) for train in held]
+    labels = {key: ("train", [fact[key] for fact in facts]) for key in ("seed", "status") if key in facts[0]}
+    return stacked.assign_coords(labels)
+
+
+def _check_alike(which: str, first: xarray.Dataset, other: xarray.Dataset) -> None:
+    """Refuse trains that cannot share axes."""
+    for name in first.dims:
+        ours, theirs = first[name].values, other[name].values
+        if name in ALONG_TRACK:
+            n = min(len(ours), len(theirs))
+            if name == "time" and not np.array_equal(ours[:n], theirs[:n]):
+                raise InputError(f"{which} have different time steps; take them one by one")
+        elif not np.array_equal(ours, theirs):
+            raise InputError(f"{which} differ along {name!r}; take them one by one")
+    for name in ("wheelset_vehicle", "wheelset_offset"):
+        if name in first.coords and not np.array_equal(first[name].values, other[name].values):
+            raise InputError(f"{which} have different vehicles; take them one by one")
+
+
+def _packages() -> tuple[Any, Any]:
+    """The packages xarray and h5netcdf, which do not come with the engine."""
+    try:
+        import h5netcdf
+        import xarray
+    except ImportError as error:
+        raise InputError(f"to_xarray: needs {error.name}; pip install 'tiengine[xarray]'") from None
+    return xarray, h5netcdf

@@ -1,0 +1,188 @@
+"""Results in other programs' files: CSV, Parquet, MATLAB.
+
+CSV and Parquet are written piece by piece, so that the length of a run does not matter. MATLAB's format of version 5
+is written at once and holds less than 2 GB; MATLAB reads the result file itself by ``h5read``, however long.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from tiengine.channel_table import ChannelTable, channel_table, chosen
+from tiengine.output_file import check_output
+from tiengine.quantity import InputError
+
+if TYPE_CHECKING:
+    from tiengine.results import Result
+
+__all__ = ["export"]
+
+CSV_VALUES = 100_000  # numbers in memory at a time: 13 MB as texts
+PARQUET_VALUES = 1_000_000  # a row group of at most 8 MB
+MAT_BYTES = 2**31 - 1  # of a file of version 5
+MAT_NAME = 63  # longest name in MATLAB
+
+
+def export(
+    result: Result, path: Path | str, *, train: int = 0, channels: Sequence[str] = (), force: bool = False
+) -> str:
+    """Write channels of one train into a file whose suffix says the format.
+
+    Args:
+        result: Open result.
+        path: ``.csv``, ``.parquet`` or ``.mat``.
+        train: Index of the train.
+        channels: Groups or channels, ``"body"``, ``"wheel/vertical_force"``; the wheels' if empty. CSV and Parquet take
+            channels that are sampled together.
+        force: Replace an existing file.
+
+    Returns:
+        What was written, in words.
+
+    Raises:
+        InputError: No such train or channel, channels that do not fit one table, a package that is missing, a file
+            that is there already or cannot be written.
+    """
+    path = Path(path)
+    if path.suffix not in _FORMATS:
+        raise InputError(f"output = '{path}': must end in {', '.join(_FORMATS)}")
+    check_output(path, force)
+    return _FORMATS[path.suffix](result, path, train, channels)
+
+
+def _write_csv(result: Result, path: Path, train: int, channels: Sequence[str]) -> str:
+    table = channel_table(result, train, channels)
+    with _replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(column.heading for column in table.columns)
+        for piece in table.pieces(CSV_VALUES):
+            texts = [column.astype(str) for column in piece]  # the shortest that reads back the same
+            writer.writerows(zip(*texts, strict=True))
+    return _size(table)
+
+
+def _write_parquet(result: Result, path: Path, train: int, channels: Sequence[str]) -> str:
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:
+        raise InputError(f"output = '{path}': Parquet needs pyarrow; pip install 'tiengine[parquet]'") from None
+    table = channel_table(result, train, channels)
+    datasets = [dataset for dataset in table.datasets for _ in range(_width(dataset))]
+    fields = [
+        pa.field(column.heading, pa.from_numpy_dtype(dataset.dtype), metadata=_described(column.unit, column.long_name))
+        for column, dataset in zip(table.columns, datasets, strict=True)
+    ]
+    schema = pa.schema(fields, metadata={"scenario": result.scenario_toml, "train": str(train)})
+    with _replacing(path) as temporary, parquet.ParquetWriter(temporary, schema) as writer:
+        for piece in table.pieces(PARQUET_VALUES):
+            columns = [np.ascontiguousarray(column) for column in piece]
+            writer.write_table(pa.Table.from_arrays([pa.array(column) for column in columns], schema=schema))
+    return _size(table)
+
+
+def _write_mat(result: Result, path: Path, train: int, channels: Sequence[str]) -> str:
+    from scipy.io import savemat
+
+    found = chosen(result, train, channels)
+    size = sum(dataset.nbytes for dataset in found.values())
+    if size > MAT_BYTES:
+        raise InputError(
+            f"output = '{path}': {size / 1e9:.1f} GB, and MATLAB's files of version 5 hold less than 2 GB; choose fewer"
+            f" channels, or read {result.name} in MATLAB by h5read (its version 7.3 is HDF5 as well)"
+        )
+    content: dict[str, Any] = {"facts": _facts(result, train)}
+    structs: dict[str, dict[str, Any]] = {"": content}
+    for channel, dataset in found.items():
+        group, _, name = channel.rpartition("/")
+        _add(_struct(structs, group, dataset.parent), name, dataset)
+    with _replacing(path) as temporary:
+        savemat(temporary, content, appendmat=False, long_field_names=True, do_compression=False, oned_as="column")
+    return f"{len(found)} channels"
+
+
+_FORMATS: dict[str, Callable[[Result, Path, int, Sequence[str]], str]] = {
+    ".csv": _write_csv,
+    ".parquet": _write_parquet,
+    ".mat": _write_mat,
+}
+
+
+def _struct(structs: dict[str, dict[str, Any]], path: str, group: Any) -> dict[str, Any]:
+    """The MATLAB structure of a group, with its coordinates; made at the first call.
+
+    Args:
+        structs: Those made so far, by path.
+        path: Of the group within the train.
+        group: Of the file.
+    """
+    if path not in structs:
+        above, _, name = path.rpartition("/")
+        outer = structs[above] if above in structs else _struct(structs, above, group.parent)
+        structs[path] = outer[_matlab_name(name, outer)] = {}
+        for label, values in group.items():
+            if isinstance(values, h5py.Dataset) and "coordinates" not in values.attrs:
+                _add(structs[path], label, values)
+    return structs[path]
+
+
+def _add(struct: dict[str, Any], name: str, dataset: Any) -> None:
+    """A dataset and its unit to a MATLAB structure; texts become a cell array."""
+    is_text = h5py.check_string_dtype(dataset.dtype)
+    key = _matlab_name(name, struct)
+    struct[key] = np.array(dataset.asstr()[:], dtype=object) if is_text else dataset[()]
+    struct.setdefault("units", {})[key] = str(dataset.attrs.get("units", "1"))
+
+
+def _facts(result: Result, train: int) -> dict[str, Any]:
+    """Whence the numbers come: file, train, scenario and the train's own attributes."""
+    own: dict[str, Any] = {}
+    for name, value in result.facts(train).items():
+        is_texts = isinstance(value, list) and all(isinstance(item, str) for item in value)
+        own[_matlab_name(name, own)] = np.array(value, dtype=object) if is_texts else value
+    return {**own, "file": result.name, "train": train, "scenario": result.scenario_toml}
+
+
+def _matlab_name(name: str, taken: dict[str, Any]) -> str:
+    """The name as MATLAB accepts it: letters, digits and underscores, a letter first, not too long, not taken."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    plain = (plain if plain[:1].isalpha() else f"x{plain}")[:MAT_NAME]
+    stem, count = plain[: MAT_NAME - 4], 2
+    while plain in taken:
+        plain, count = f"{stem}_{count}", count + 1
+    return plain
+
+
+def _described(unit: str, long_name: str) -> dict[str, str]:
+    return {"unit": unit, "long_name": long_name}
+
+
+def _width(dataset: Any) -> int:
+    """Columns that a dataset is cut into."""
+    return int(np.prod(dataset.shape[1:], dtype=np.int64))
+
+
+def _size(table: ChannelTable) -> str:
+    return f"{table.rows} rows of {len(table.columns)} columns"
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    """A temporary file that gets its name when it is complete, and goes if it is not."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(f"output = '{path}': cannot be written ({error.strerror or error})") from None
+    finally:
+        temporary.unlink(missing_ok=True)
