@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tiengine.conicity import equivalent_conicity, wheelset_position
 from tiengine.contact_geometry import ContactSettings, WheelRailPair
+from tiengine.figures.palette import BLUE, GREEN, ORANGE, VERMILION
 from tiengine.profile import Profile
 from tiengine.quantity import InputError
 
@@ -29,8 +30,6 @@ Reals = NDArray[np.float64]
 REFERENCE_AMPLITUDE = 3e-3
 """Amplitude at which conicities are compared [m], EN 15302."""
 SHIFT_STEP = 0.05e-3
-ORANGE, GREEN, BLUE, VERMILION = "#E69F00", "#009E73", "#0072B2", "#D55E00"
-"""Colours of Okabe and Ito, which the colour-blind tell apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,13 +130,12 @@ def draw(report: ContactReport, path: Path) -> None:
     Raises:
         InputError: A suffix that is no format of figures, or a file that cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    from tiengine.figures.style import check_suffix, plain, save
+
+    check_suffix(path)
     figure = Figure(figsize=(8.0, 8.4), layout="constrained")
-    known = FigureCanvasAgg(figure).get_supported_filetypes()
-    if path.suffix.lower().lstrip(".") not in known:
-        raise InputError(f"output = {str(path)!r}: its suffix must be one of {', '.join(sorted(known))}")
     grid = figure.add_gridspec(3, 2, height_ratios=(1.0, 1.0, 1.5))
     _draw_difference(figure.add_subplot(grid[0, 0]), report)
     _draw_conicity(figure.add_subplot(grid[0, 1]), report)
@@ -146,15 +144,12 @@ def draw(report: ContactReport, path: Path) -> None:
     _draw_profiles(figure.add_subplot(grid[2, :]), report)
     settings = report.pair.settings
     figure.suptitle(
-        f"{report.pair.wheel.name} on {report.pair.rail.name}, cant {_cant(settings.cant)}, gauge"
+        f"{plain(report.pair.wheel.name)} on {plain(report.pair.rail.name)}, cant {_cant(settings.cant)}, gauge"
         f" {settings.gauge * 1e3:g} mm, tape circles {2e3 * settings.half_spacing:g} mm apart,"
         f" radius {settings.wheel_radius * 1e3:g} mm",
         fontsize="medium",
     )
-    try:
-        figure.savefig(path, dpi=150)
-    except OSError as error:
-        raise InputError(f"output = {str(path)!r}: cannot be written ({error.strerror or error})") from None
+    save(figure, path)
 
 
 def _cant(cant: float) -> str:

@@ -21,7 +21,15 @@ from tiengine.filters import band_pass, sliding_mean
 from tiengine.index import Index, worst
 from tiengine.ride import Ride
 
-__all__ = ["body_indices", "extreme", "shortfall", "wheel_force_limit", "wheel_indices"]
+__all__ = [
+    "QUOTIENT_LIMIT",
+    "axle_force_limit",
+    "body_indices",
+    "extreme",
+    "shortfall",
+    "wheel_force_limit",
+    "wheel_indices",
+]
 
 Reals = NDArray[np.float64]
 
@@ -84,6 +92,15 @@ def wheel_force_limit(static: float, speed: float) -> float:
     return min(90.0 + static, Q_CAPS[bisect_left(Q_SPEEDS, 3.6 * speed - 1e-6)])
 
 
+def axle_force_limit(static: float) -> float:
+    """Limit of the sum of Y of a wheelset [kN]; k1 = 1: all but freight wagons.
+
+    Args:
+        static: Static load of the wheelset, both wheels [kN].
+    """
+    return 10.0 + static / 3.0
+
+
 def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
     """Y/Q, sum of Y, and Q at the worst wheel or wheelset of a vehicle."""
     found: dict[str, list[Index]] = {}
@@ -111,7 +128,7 @@ def _of_wheelset(ride: Ride, vehicle: int, wheelset: int) -> Iterator[Index]:
         limit = wheel_force_limit(1e-3 * forces.static[i], speed)
         yield index("wheel force Q", side, value, "kN", limit, "7.5.3 track loading")
     value = 1e-3 * extreme(*sliding_mean(forces.position, forces.Y.sum(axis=1)), speed, SAFETY)
-    limit = 10.0 + 1e-3 * forces.static.sum() / 3.0  # k1 = 1: all but freight wagons
+    limit = axle_force_limit(1e-3 * float(forces.static.sum()))
     yield index("sum of Y, 2 m mean", "", value, "kN", limit, "7.5.2 running safety")
 
 

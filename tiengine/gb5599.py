@@ -27,7 +27,15 @@ from tiengine.filters import band_pass, sliding_mean
 from tiengine.index import Index, worst
 from tiengine.ride import FloorPoint, Forces, Ride
 
-__all__ = ["body_indices", "sperling", "sperling_weight", "unloading", "wheel_indices"]
+__all__ = [
+    "axle_force_limit",
+    "body_indices",
+    "sperling",
+    "sperling_weight",
+    "unloading",
+    "unloading_limit",
+    "wheel_indices",
+]
 
 Reals = NDArray[np.float64]
 Direction = Literal["vertical", "lateral"]
@@ -84,6 +92,20 @@ def unloading(P: Reals, static: float) -> float:
     return float((static - P.min()) / static)
 
 
+def unloading_limit(speed: float) -> float:
+    """Largest part of its static load that a wheel may lose, at a speed [m/s]."""
+    return UNLOADING_LIMITS[speed > SLOW + 1e-9]
+
+
+def axle_force_limit(static: float) -> float:
+    """Limit of the lateral axle force [kN].
+
+    Args:
+        static: Static load of the wheelset, both wheels [kN].
+    """
+    return 15.0 + static / 3.0
+
+
 def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
     """Derailment coefficient, wheel unloading and lateral axle force at the worst wheel or wheelset."""
     found: dict[str, list[Index]] = {}
@@ -100,10 +122,9 @@ def _of_wheelset(forces: Forces, speed: float) -> Iterator[tuple[str, str, float
         _, quotient = sliding_mean(forces.position, forces.quotient[:, i])
         yield "derailment coefficient", side, float(np.abs(quotient).max()), "-", DERAILMENT_LIMIT
         _, P = sliding_mean(forces.position, forces.Q[:, i])
-        limit = UNLOADING_LIMITS[speed > SLOW + 1e-9]
-        yield "wheel unloading", side, unloading(P, float(forces.static.mean())), "-", limit
+        yield "wheel unloading", side, unloading(P, float(forces.static.mean())), "-", unloading_limit(speed)
     _, H = sliding_mean(forces.position, forces.Y.sum(axis=1))
-    limit = 15.0 + 1e-3 * float(forces.static.sum()) / 3.0
+    limit = axle_force_limit(1e-3 * float(forces.static.sum()))
     yield "lateral axle force", "", 1e-3 * float(np.abs(H).max()), "kN", limit
 
 

@@ -11,7 +11,7 @@ from rich.table import Table
 from tiengine.index import Index
 from tiengine.metrics import Metrics
 
-__all__ = ["metrics_table"]
+__all__ = ["metrics_table", "notes"]
 
 COLOURS = {"within": "green", "over": "bold red", "none": "dim"}
 
@@ -46,11 +46,16 @@ def metrics_table(metrics: Metrics) -> RenderableType:
         table.add_row(
             *map(escape, row), f"[{colour}]{verdict}[/{colour}]", index.kind, *map(escape, extra), escape(index.clause)
         )
-    return Group(table, "", *map(escape, _notes([each.worst for each in spread], metrics)))
+    return Group(table, "", *map(escape, notes([each.worst for each in spread], metrics)))
 
 
-def _notes(indices: Iterable[Index], metrics: Metrics) -> list[str]:
-    """What the table leaves out, each sentence once."""
+def notes(indices: Iterable[Index], metrics: Metrics) -> list[str]:
+    """What a table of indices leaves out, each sentence once.
+
+    Args:
+        indices: Those of the table.
+        metrics: Say which trains are missing.
+    """
     found: dict[str, None] = {}
     for index in indices:
         if index.shortfall:

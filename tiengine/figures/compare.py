@@ -1,0 +1,144 @@
+"""Two results over the same way: wheel forces laid over each other, and their difference."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.figures.curve import Band, Curve, bins_for
+from tiengine.figures.palette import BLACK, GREY
+from tiengine.figures.source import Samples, Train
+from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure
+from tiengine.quantity import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tiengine.results import Result
+
+__all__ = ["draw"]
+
+Reals = NDArray[np.float64]
+
+CHANNELS = {"vertical_force": "Vertical", "lateral_force": "Lateral"}
+LEAST_WAY = 1.0  # m that both must have run
+SAME_PLACE = 1e-3  # m
+
+
+@in_style
+def draw(result: Result, other: Result, train: int = 0) -> Figure:
+    """Forces of the leading left wheel in both files; the difference, of all wheels, second less first.
+
+    Equal chainages are compared. Where samples do not fall on the same places, those of the second file are
+    interpolated linearly.
+
+    Args:
+        result: The first file.
+        other: The second.
+        train: Number of the train, in both.
+
+    Raises:
+        InputError: The two have different wheelsets, no way in common, or one lacks the forces.
+    """
+    a, b = Train(result, train), Train(other, train)
+    first, second = a.samples("wheel", *CHANNELS), b.samples("wheel", *CHANNELS)
+    begin, end, offset = _common(first, second, f"{result.name} and {other.name}")
+    differences = {name: _Difference(begin, end, offset, bins_for(len(first))) for name in CHANNELS}
+    for x, values, others in _side_by_side(first, second, begin, end):
+        for name, difference in differences.items():
+            difference.add(x, 1e-3 * values[name], 1e-3 * others[name])
+    figure = new_figure(16.0, f"{a.caption} (a) and {b.caption} (b)")
+    axes = figure.subplots(4, 1, sharex=True)
+    for (name, words), (above, below) in zip(CHANNELS.items(), (axes[:2], axes[2:]), strict=True):
+        differences[name].plot(above, below)
+        above.set_title(f"{words} force, leading left wheel")
+    axes[3].set_xlabel("chainage of the wheelset [m]")
+    handles = [handle for panel in axes[:2] for handle in panel.get_legend_handles_labels()[0]]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _common(first: Samples, second: Samples, where: str) -> tuple[float, float, Reals]:
+    """The way that both have run, of the first vehicle's centre [m], and the places of the wheelsets in the train."""
+    offsets: list[Reals] = [samples.group["wheelset_offset"][:] for samples in (first, second)]
+    if offsets[0].shape != offsets[1].shape or np.abs(offsets[0] - offsets[1]).max() > SAME_PLACE:
+        counts = " and ".join(str(len(each)) for each in offsets)
+        raise InputError(f"{where} cannot be compared: {counts} wheelsets, or not at the same places of the train")
+    begin, end = max(first.way[0], second.way[0]), min(first.way[1], second.way[1])
+    if end - begin < LEAST_WAY:
+        ways = " and ".join(f"{way[0]:.1f} to {way[1]:.1f} m" for way in (first.way, second.way))
+        raise InputError(f"{where} cannot be compared: chainages {ways} have no metre in common")
+    return begin, end, offsets[0]
+
+
+def _side_by_side(
+    first: Samples, second: Samples, begin: float, end: float
+) -> Iterator[tuple[Reals, dict[str, Reals], dict[str, Reals]]]:
+    """Chainages [m] and channels of the first file, and of the second at the same chainages, piece after piece."""
+    for x, a in first.slices(first.at(begin), first.at(end + 1e-9)):
+        around = slice(max(second.at(float(x[0])) - 1, 0), min(second.at(float(x[-1])) + 1, len(second)))
+        there, b = second.read(around.start, around.stop)
+        yield x, a, {name: _at(x, there, values) for name, values in b.items()}
+
+
+def _at(x: Reals, there: Reals, values: Reals) -> Reals:
+    """Values (n, ...) at other places."""
+    columns = [np.interp(x, there, column) for column in values.reshape(len(there), -1).T]
+    return np.stack(columns, axis=1).reshape(len(x), *values.shape[1:])
+
+
+class _Difference:
+    """One channel of two files [kN]."""
+
+    def __init__(self, begin: float, end: float, offset: Reals, bins: int) -> None:
+        self._offset = offset
+        lead = begin + float(offset[0]), end + float(offset[0])
+        self._curves = [Curve(*lead) for _ in range(3)]
+        self._band = Band(begin + float(offset.min()), end + float(offset.max()), bins)
+        self._count, self._largest, self._peak = 0, 0.0, 0.0
+        self._sum: Reals = np.zeros((len(offset), 2))
+        self._squares, self._square_differences = np.zeros_like(self._sum), 0.0
+
+    def add(self, x: Reals, a: Reals, b: Reals) -> None:
+        """Forces of both files at the same chainages, shape (n, wheelsets, 2)."""
+        difference = b - a
+        for curve, values in zip(self._curves, (a, b, difference), strict=True):
+            curve.add(x + self._offset[0], values[:, 0, 0])
+        for w, offset in enumerate(self._offset):
+            self._band.add(x + offset, difference[:, w])
+        self._count += len(x)
+        self._largest = max(self._largest, float(np.abs(difference).max()))
+        self._peak = max(self._peak, float(np.abs(a).max()))
+        self._sum += a.sum(axis=0)
+        self._squares += (a**2).sum(axis=0)
+        self._square_differences += float((difference**2).sum())
+
+    @property
+    def words(self) -> str:
+        """How far apart the two are, over all wheels."""
+        variance = float((self._squares / self._count - (self._sum / self._count) ** 2).mean())
+        rms = float(np.sqrt(self._square_differences / self._count / self._sum.size))
+        part = f" ({100.0 * self._largest / self._peak:.2g} % of a's largest)" if self._peak else ""
+        spread = f" ({100.0 * rms / np.sqrt(variance):.2g} % of a's standard deviation)" if variance > 0.0 else ""
+        return f"largest {self._largest:.3g} kN{part}, rms {rms:.3g} kN{spread}"
+
+    def plot(self, above: Axes, below: Axes) -> None:
+        """Both files above, the difference below."""
+        for curve, look, words in zip(self._curves, (LEFT, RIGHT), ("a", "b"), strict=False):
+            above.plot(*curve.line, label=words, rasterized=curve.is_thinned, **look._asdict())
+        band = self._band
+        below.fill_between(
+            band.x, band.low, band.high, color=GREY, linewidth=0.0, rasterized=True, label="b - a, all wheels"
+        )
+        line = self._curves[2]
+        below.plot(
+            *line.line, color=BLACK, linewidth=0.7, rasterized=line.is_thinned, label="b - a, leading left wheel"
+        )
+        below.set_title(f"b - a: {self.words}")
+        for panel in (above, below):
+            panel.margins(x=0.0)
+            panel.set_ylabel("[kN]")

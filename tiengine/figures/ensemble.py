@@ -1,0 +1,99 @@
+"""Wheel forces over many trains: median and band of 5 to 95 % in every stretch of the way."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.figures.curve import Band
+from tiengine.figures.palette import BLUE, GREY, SKY, VERMILION
+from tiengine.figures.source import AbsentError, Samples, Train
+from tiengine.figures.style import in_style, new_figure
+from tiengine.results import COMPLETE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tiengine.results import Result
+
+__all__ = ["draw"]
+
+Reals = NDArray[np.float64]
+
+STRETCH = 2.0  # m
+STRETCHES = 300  # at most
+LEAST_TRAINS = 3
+
+
+@in_style
+def draw(result: Result, train: int | None = None) -> Figure:
+    """Largest and smallest Q and largest |Y| of the leading wheelset in every stretch of the way, over all trains.
+
+    Trains that did not run to their end are left out.
+
+    Args:
+        result: An open file.
+        train: Not used: the figure is one of all trains.
+
+    Raises:
+        AbsentError: Fewer than three trains in the file that ran to their end, or no wheel forces.
+    """
+    done = [i for i in range(result.trains) if result.status(i) == COMPLETE]
+    if len(done) < LEAST_TRAINS:
+        raise AbsentError(
+            f"{result.name}: {len(done)} train(s) that ran to the end; bands over trains need {LEAST_TRAINS}: set"
+            " ensemble.size and run again"
+        )
+    runs = [Train(result, i).samples("wheel", "vertical_force", "lateral_force") for i in done]
+    lead = float(runs[0].group["wheelset_offset"][0])
+    begin, end = (pick(run.way[i] for run in runs) + lead for i, pick in ((0, min), (1, max)))
+    bins = int(np.clip(np.ceil((end - begin) / STRETCH), 1, STRETCHES))
+    extremes = np.stack([_extremes(run, begin, end, bins) for run in runs])
+    x: Reals = begin + (end - begin) / bins * (np.arange(bins, dtype=np.float64) + 0.5)
+    figure = new_figure(
+        15.0, f"{result.name.rpartition('/')[2]}: leading wheelset of {len(done)} trains, stretches of"
+        f" {(end - begin) / bins:.3g} m"
+    )  # fmt: skip
+    axes = figure.subplots(3, 1, sharex=True)
+    titles = ("Largest Q in the stretch", "Smallest Q in the stretch", "Largest |Y| in the stretch")
+    for i, (panel, title) in enumerate(zip(axes, titles, strict=True)):
+        farthest = done[_plot(panel, x, extremes[:, i])]
+        panel.set(title=f"{title}; farthest from the median: train {farthest}", ylabel="[kN]")
+        panel.margins(x=0.0)
+    axes[2].set_xlabel("chainage of the wheelset [m]")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure
+
+
+def _extremes(run: Samples, begin: float, end: float, bins: int) -> Reals:
+    """Largest Q, smallest Q, largest |Y| [kN], shape (3, bins); NaN where the train was not."""
+    offset = float(run.group["wheelset_offset"][0])
+    Q, Y = Band(begin, end, bins), Band(begin, end, bins)
+    for position, channels in run.slices():
+        Q.add(position + offset, 1e-3 * channels["vertical_force"][:, 0])
+        Y.add(position + offset, 1e-3 * np.abs(channels["lateral_force"][:, 0]))
+    return np.stack([Q.high, Q.low, Y.high])
+
+
+def _plot(axes: Axes, x: Reals, values: Reals) -> int:
+    """Values of shape (trains, bins); empty stretches stay empty. Which train is farthest from the median."""
+    reached = ~np.isnan(values).all(axis=0)
+    x, values = x[reached], values[:, reached]
+    low, middle, high = np.nanpercentile(values, (5.0, 50.0, 95.0), axis=0)
+    axes.fill_between(
+        x,
+        np.nanmin(values, axis=0),
+        np.nanmax(values, axis=0),
+        color=GREY,
+        alpha=0.6,
+        linewidth=0.0,
+        label="all trains",
+    )
+    axes.fill_between(x, low, high, color=SKY, alpha=0.6, linewidth=0.0, label="5 to 95 %")
+    axes.plot(x, middle, color=BLUE, label="median")
+    worst = int(np.nanargmax(np.nanmax(np.abs(values - middle), axis=1)))
+    axes.plot(x, values[worst], color=VERMILION, linewidth=0.7, linestyle="--", label="farthest from the median")
+    return worst

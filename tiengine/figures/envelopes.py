@@ -1,0 +1,125 @@
+"""Extremes of every seat and slab over chainage, and what defects make of their neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tiengine.figures.curve import Curve
+from tiengine.figures.extremes import Extremes, read_extremes
+from tiengine.figures.neighbours import draw_seats, draw_slabs
+from tiengine.figures.palette import BLACK, ORANGE, PURPLE
+from tiengine.figures.source import AbsentError, Train
+from tiengine.figures.style import LEFT, RIGHT, Look, in_style, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+    from tiengine.results import Result
+
+__all__ = ["draw"]
+
+KEY = "output.envelopes"
+SIDES = ((0, LEFT, "left"), (1, RIGHT, "right"))
+
+
+@in_style
+def draw(result: Result, train: int = 0) -> Figure:
+    """Forces of the rail on the fastenings, and pressure and moments of the slabs; defects marked and enlarged.
+
+    Args:
+        result: An open file.
+        train: Number of the train.
+
+    Raises:
+        InputError: No such train, or no envelopes in the file.
+    """
+    source = Train(result, train)
+    seats, slabs = read_extremes(source, "seats", KEY), read_extremes(source, "slabs", KEY)
+    if not seats.reached.any():
+        raise AbsentError(f"{result.name}: the train came to no seat: no envelopes to draw")
+    enlarged = [(extremes, draw) for extremes, draw in ((seats, draw_seats), (slabs, draw_slabs)) if extremes.defects]
+    figure = new_figure(20.0 if enlarged else 15.0, f"{source.caption}: extremes of the whole run, every seat and slab")
+    below: Figure | SubFigure = figure
+    if enlarged:
+        above, below = figure.subfigures(2, 1, height_ratios=(1.0, 2.4), squeeze=False)[:, 0]
+        _enlarge(above, enlarged)
+    axes = below.subplots(4, 1, sharex=True)
+    _vertical(axes[0], seats)
+    _lateral(axes[1], seats)
+    _pressure(axes[2], slabs)
+    _moments(axes[3], slabs)
+    for panel in axes:
+        _mark(panel, seats, slabs)
+        panel.margins(x=0.0)
+    axes[3].set_xlabel("chainage [m]")
+    handles = dict(zip(*reversed(axes[0].get_legend_handles_labels()), strict=True))
+    below.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3 if len(handles) > 5 else 5)
+    return figure
+
+
+def _enlarge(place: SubFigure, enlarged: Sequence[tuple[Extremes, Callable[[Axes, Extremes], None]]]) -> None:
+    """Seats, slabs or both about their worst defect."""
+    widths = (2.2, 1.0)[: len(enlarged)]
+    panels = np.atleast_1d(place.subplots(1, len(enlarged), width_ratios=widths))
+    for panel, (extremes, draw_about) in zip(panels, enlarged, strict=True):
+        draw_about(panel, extremes)
+    place.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+
+
+def _line(axes: Axes, extremes: Extremes, values: Any, look: Look, scale: float, **more: Any) -> None:
+    """One row of extremes over the chainage that the train came to."""
+    x = extremes.chainage[extremes.reached]
+    curve = Curve(float(x[0]), float(x[-1]))
+    curve.add(x, scale * np.asarray(values, np.float64)[extremes.reached])
+    axes.plot(*curve.line, rasterized=curve.is_thinned, **look._asdict(), **more)
+
+
+def _vertical(axes: Axes, seats: Extremes) -> None:
+    for side, look, words in SIDES:
+        _line(axes, seats, seats["largest_vertical_force"][:, side], look, 1e-3, label=words)
+        _line(axes, seats, seats["smallest_vertical_force"][:, side], look, 1e-3, linewidth=0.5)
+    axes.axhline(1e-3 * seats.sound_median("largest_vertical_force"), color=BLACK, linewidth=0.7, linestyle=":",
+                 label="median of sound seats")  # fmt: skip
+    axes.set(ylabel="[kN]", title="Fastenings: largest vertical force and, thin, smallest (below zero: uplift)")
+
+
+def _lateral(axes: Axes, seats: Extremes) -> None:
+    for side, look, _ in SIDES:
+        for name in ("largest_lateral_force", "smallest_lateral_force"):
+            _line(axes, seats, seats[name][:, side], look, 1e-3, linewidth=0.8 if name[0] == "l" else 0.5)
+    axes.set(ylabel="[kN]", title="Fastenings: largest lateral force to the right and, thin, to the left")
+
+
+def _pressure(axes: Axes, slabs: Extremes) -> None:
+    for name, look in (("largest_pressure", Look(BLACK, "-")), ("smallest_pressure", Look(BLACK, "--"))):
+        _line(axes, slabs, slabs[name], look, 1e-3, drawstyle="steps-mid")
+    axes.set(ylabel="[kPa]", title="Mortar: largest pressure and, dashed, smallest, dead weight included")
+
+
+def _moments(axes: Axes, slabs: Extremes) -> None:
+    looks = {"x": Look("0.45", "-"), "y": Look(BLACK, "-")}
+    for direction, look in looks.items():
+        _line(axes, slabs, slabs[f"largest_moment_{direction}"], look, 1e-3, drawstyle="steps-mid")
+        dashed = look._replace(linestyle="--")
+        _line(axes, slabs, slabs[f"smallest_moment_{direction}"], dashed, 1e-3, drawstyle="steps-mid")
+    title = "Slabs: largest and, dashed, smallest bending moment; grey along the track, black across"
+    axes.set(ylabel="[kN m/m]", title=title)
+
+
+def _mark(axes: Axes, seats: Extremes, slabs: Extremes) -> None:
+    """Defects, with a triangle that is seen in a long run, too; and where not every wheel has passed."""
+    for extremes, colour, hatch, words in (
+        (seats, ORANGE, "", "fastenings with a defect"),
+        (slabs, PURPLE, "////", "slab over a void"),
+    ):
+        for row in extremes.defects:
+            low, high = extremes.span(row)
+            axes.axvspan(low, high, color=colour, alpha=0.4, hatch=hatch, linewidth=0.0, zorder=0, label=words)
+            middle = 0.5 * (low + high)
+            axes.plot(middle, 1.0, "v", color=colour, markersize=4, transform=axes.get_xaxis_transform(), clip_on=False)
+    for low, high in seats.half_passed:
+        axes.axvspan(low, high, color="0.94", linewidth=0.0, zorder=-1, label="not passed by all wheels")

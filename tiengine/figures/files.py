@@ -1,0 +1,77 @@
+"""Figures as files: where each goes, and what could not be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tiengine.figures.catalogue import COMPARE, KINDS, kind_named
+from tiengine.figures.source import AbsentError
+from tiengine.figures.style import check_suffix, save
+from tiengine.output_file import check_output
+from tiengine.quantity import InputError
+
+if TYPE_CHECKING:
+    from tiengine.results import Result
+
+__all__ = ["draw_all", "draw_one"]
+
+
+def draw_one(result: Result, kind: str, output: Path | None, train: int = 0, other: Result | None = None) -> Path:
+    """Draw one figure, replacing a file.
+
+    Args:
+        result: An open file.
+        kind: Name of the figure.
+        output: File or existing folder; beside the result if None.
+        train: Number of the train.
+        other: The second file, of ``compare``.
+
+    Returns:
+        The figure's path.
+
+    Raises:
+        InputError: The figure cannot be drawn or written.
+    """
+    path = _place(result, kind, output)
+    check_suffix(path)
+    check_output(path, force=True)
+    if (kind == COMPARE.name) != (other is not None):
+        raise InputError(
+            "kind = 'compare': needs the second file: --with FILE" if other is None else "--with: only for kind compare"
+        )
+    arguments = (train,) if other is None else (other, train)
+    save(kind_named(kind).draw(result, *arguments), path)
+    return path
+
+
+def draw_all(result: Result, output: Path | None, train: int = 0) -> Iterator[tuple[str, str]]:
+    """Draw every figure that the file can give, replacing files.
+
+    Args:
+        result: An open file.
+        output: An existing folder; beside the result if None.
+        train: Number of the train.
+
+    Yields:
+        Kind, and its path or why it was skipped.
+
+    Raises:
+        InputError: A figure cannot be written, or there is no such train or folder.
+    """
+    if output is not None and not output.is_dir():
+        raise InputError(f"output = '{output}': must be an existing folder for all kinds; name a kind for one figure")
+    for kind in KINDS:
+        try:
+            yield kind.name, str(draw_one(result, kind.name, output, train))
+        except AbsentError as error:
+            yield kind.name, f"skipped: {error}"
+
+
+def _place(result: Result, kind: str, output: Path | None) -> Path:
+    """Path of a figure."""
+    if output is not None and not output.is_dir():
+        return output
+    file = Path(result.name)
+    return (output or file.parent) / f"{file.stem}_{kind}.png"

@@ -1,0 +1,100 @@
+"""Time histories of the gauges: what a place of rail, slab or fastening does as the train passes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from tiengine.figures.curve import Curve
+from tiengine.figures.palette import BLUE, VERMILION
+from tiengine.figures.source import AbsentError, Train
+from tiengine.figures.style import Look, in_style, new_figure, plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tiengine.results import Result
+
+__all__ = ["draw"]
+
+Reals = NDArray[np.float64]
+
+MOST = 8  # gauges a figure
+LATERAL, VERTICAL = Look(VERMILION, "--"), Look(BLUE, "-")
+MOTIONS = {"displacement": (1e3, "[mm]"), "velocity": (1e3, "[mm/s]"), "acceleration": (1.0, "[m/s²]")}
+FORCES = {"vertical_force": (1e-3, "[kN]", VERTICAL), "lateral_force": (1e-3, "[kN]", LATERAL)}
+
+
+@in_style
+def draw(result: Result, train: int = 0) -> Figure:
+    """A row a gauge: motion of rail or slab, or forces of a fastening, over time; wheels that pass in grey.
+
+    Args:
+        result: An open file.
+        train: Number of the train.
+
+    Raises:
+        InputError: No such train, or no gauge in the file that the train came to.
+    """
+    source = Train(result, train)
+    every = source.group("gauges", "[[gauges]]")
+    gauges = {name: group for name, group in every.items() if len(group["time"]) > 1}
+    if not gauges:
+        raise AbsentError(f"{result.name}: the train came to none of its gauges: {', '.join(every)}")
+    shown = list(gauges.items())[:MOST]
+    more = f", {MOST} of {len(gauges)} gauges" if len(gauges) > MOST else ""
+    figure = new_figure(1.5 + 4.2 * len(shown), f"{source.caption}: gauges{more}; wheels that pass in grey")
+    rows = figure.subfigures(len(shown), 1, squeeze=False)[:, 0]
+    for row, (name, group) in zip(rows, shown, strict=True):
+        row.suptitle(plain(_title(name, group)), x=0.01, ha="left", fontsize=8.0)
+        axes = row.subplots(1, 3 if "displacement" in group else 2)
+        _history(axes, group)
+        for panel in axes:
+            for passing in _passings(group, source.scenario.parts.wheelset_positions):
+                panel.axvline(passing, color="0.75", linewidth=0.6, zorder=0)
+            panel.margins(x=0.0)
+            panel.set_xlabel("time [s]")
+    figure.legend(
+        handles=[Line2D([], [], label="vertical, down", **VERTICAL._asdict()),
+                 Line2D([], [], label="lateral, right", **LATERAL._asdict())],
+        loc="upper right", ncols=2,
+    )  # fmt: skip
+    return figure
+
+
+def _title(name: str, group: Any) -> str:
+    attributes = group.attrs
+    where = f", {attributes['side']} side" if "side" in attributes else f", y = {attributes.get('y', 0.0):g} m"
+    return f"{name}: {attributes['on']} at {attributes['chainage']:g} m{where}"
+
+
+def _history(axes: NDArray[np.object_], group: Any) -> None:
+    if "displacement" in group:
+        for panel, (name, (scale, unit)) in zip(axes, MOTIONS.items(), strict=True):
+            for column, look in ((1, VERTICAL), (0, LATERAL)):
+                _plot(panel, group, scale * group[name][:, column].astype(np.float64), look)
+            panel.set(title=name, ylabel=unit)
+        return
+    for panel, (name, (scale, unit, look)) in zip(axes, FORCES.items(), strict=True):
+        _plot(panel, group, scale * group[name][:].astype(np.float64), look)
+        panel.set(title=f"{name.replace('_', ' ')} of the rail on the fastening", ylabel=unit)
+
+
+def _plot(axes: Axes, group: Any, values: Reals, look: Look) -> None:
+    time = group["time"][:]
+    curve = Curve(float(time[0]), float(time[-1]))
+    curve.add(time, values)
+    axes.plot(*curve.line, rasterized=curve.is_thinned, **look._asdict())
+
+
+def _passings(group: Any, wheelsets: Reals) -> Reals:
+    """Times at which wheelsets stand over the gauge [s]."""
+    position = group["position"][:]
+    centre = float(group.attrs["chainage"]) - wheelsets
+    centre = centre[(centre > position[0]) & (centre < position[-1])]
+    times: Reals = np.interp(centre, position, group["time"][:])
+    return times

@@ -1,0 +1,198 @@
+"""Power spectral densities of wheel forces and accelerations, with the frequencies that a track imposes.
+
+What is passed every d excites at V/d: seats, slabs, and seen from the rail, wheelsets of a bogie, bogies, vehicles.
+P2: :mod:`tiengine.p2`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from tiengine.figures.palette import BLACK, BLUE, GREEN, ORANGE
+from tiengine.figures.source import SLICE, AbsentError, Samples, Train
+from tiengine.figures.style import LEFT, RIGHT, Look, in_style, new_figure, plain
+from tiengine.p2 import p2_of
+from tiengine.setup import contact_settings
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tiengine.results import Result
+
+__all__ = ["draw", "passing_frequencies", "welch"]
+
+Reals = NDArray[np.float64]
+
+LONGEST_SEGMENT = 1.0  # s, 1 Hz
+SEGMENTS_END_TO_END = 4  # at least: seven with their overlaps
+LEAST_DURATION = 0.4  # s
+HIGHEST = 1000.0  # Hz
+Y, Z = 0, 1
+
+
+@in_style
+def draw(result: Result, train: int = 0) -> Figure:
+    """Densities of Q and Y, mean over all wheels, and of the accelerations of the leading vehicle's bodies.
+
+    Args:
+        result: An open file.
+        train: Number of the train.
+
+    Raises:
+        InputError: No such train, no wheel forces in the file, or too short a run behind the run-in.
+    """
+    source = Train(result, train)
+    wheels = source.samples("wheel", "vertical_force", "lateral_force")
+    segment = _segment(source, wheels)
+    figure = new_figure(14.0, f"{source.caption}: Welch's method, Hann windows of {segment:.3g} s, run-in left out")
+    above, below = figure.subplots(2, 1, sharex=True)
+    frequency, densities = welch(wheels, wheels.after(source.scenario.output.run_in), segment)
+    for look, name, words in ((LEFT, "vertical_force", "vertical, Q"), (RIGHT, "lateral_force", "lateral, Y")):
+        _plot(above, frequency, densities[name].mean(axis=(1, 2)), look, words)
+    above.set(ylabel="density [N²/Hz]", title="Wheel forces, mean over all wheels")
+    _accelerations(below, source, segment)
+    top = min(HIGHEST, 0.5 / wheels.interval)
+    above.set_xlim(1.0 / segment, top)
+    largest = max(above.dataLim.y1, 1e-30)
+    above.set_ylim(1e-12 * largest, 3.0 * largest)  # room for the words
+    below.set_xlabel("frequency [Hz]")
+    below.xaxis.set_major_formatter("{x:g}")
+    marks = passing_frequencies(source)
+    for panel in (above, below):
+        _mark(panel, marks, words=panel is above, limits=(1.0 / segment, top))
+        if panel.get_legend_handles_labels()[0]:
+            panel.legend(loc="upper right" if panel is above else "lower left")
+    return figure
+
+
+def welch(samples: Samples, begin: int, segment: float) -> tuple[Reals, dict[str, Reals]]:
+    """One-sided densities by Welch's method, Hann windows half overlapping, slice by slice.
+
+    Args:
+        samples: Channels.
+        begin: First sample that counts.
+        segment: Length of a window [s].
+
+    Returns:
+        Frequencies [Hz], shape (n,), and densities [unit^2/Hz] by channel, shape (n, ...).
+    """
+    size = round(segment / samples.interval)
+    step = size - size // 2
+    windows = (len(samples) - begin - size) // step + 1
+    at_once = max(SLICE // step, 1)
+    total: dict[str, Reals] = {}
+    frequency = np.empty(0)
+    for first in range(0, windows, at_once):
+        count = min(at_once, windows - first)
+        start = begin + first * step
+        _, channels = samples.read(start, start + (count - 1) * step + size)
+        for name, values in channels.items():
+            frequency, S = signal.welch(values, 1.0 / samples.interval, nperseg=size, axis=0)
+            total[name] = total.get(name, 0.0) + count / windows * S
+    return frequency, total
+
+
+def passing_frequencies(source: Train) -> dict[str, tuple[float, float]]:
+    """Lowest and highest frequency [Hz] of what passes, and P2, by name.
+
+    Args:
+        source: The train; its scenario gives all distances.
+    """
+    scenario, parts = source.scenario, source.scenario.parts
+    axles = parts.vehicles[0].axle_positions
+    half = (len(axles) + 1) // 2
+    distances = {"seats": parts.slab.fastening_pitch, "slabs": parts.slab.pitch}
+    if len(axles) > 2:
+        distances["wheelsets"] = float(axles[0] - axles[1])
+        distances["bogies"] = float(axles[:half].mean() - axles[half:].mean())
+    elif len(axles) == 2:
+        distances["wheelsets"] = float(axles[0] - axles[1])
+    if len(parts.vehicles) > 1:
+        distances["vehicles"] = float(parts.centres[0] - parts.centres[1])
+    first, last = scenario.rear + scenario.centre_in_window, scenario.train.distance
+    speeds = [scenario.train.speed.at(x)[0] for x in np.linspace(first, first + last, 50)]
+    found = {name: (min(speeds) / d, max(speeds) / d) for name, d in distances.items()}
+    found["2 x seats"] = tuple(2.0 * f for f in found["seats"])  # type: ignore[assignment]
+    p2 = p2_of(parts, contact_settings(scenario, source.model))
+    return {**found, "P2": (p2, p2)}
+
+
+def _segment(source: Train, samples: Samples) -> float:
+    """Length of a window [s]."""
+    count = len(samples) - samples.after(source.scenario.output.run_in)
+    duration = count * samples.interval
+    if duration < LEAST_DURATION:
+        raise AbsentError(
+            f"{source.result.name}: {duration:.3g} s behind the run-in are too short for a spectrum, {LEAST_DURATION} s"
+            " are needed; set a longer train.distance or a shorter output.run_in and run again"
+        )
+    return min(LONGEST_SEGMENT, duration / SEGMENTS_END_TO_END)
+
+
+def _accelerations(axes: Axes, source: Train, segment: float) -> None:
+    """Car, frames and wheelsets of the leading vehicle; a sentence where the file has no accelerations."""
+    axes.set(ylabel="density [(m/s²)²/Hz]", title="Accelerations, leading vehicle")
+    try:
+        bodies = source.samples("body", "acceleration")
+    except AbsentError as absent:
+        axes.text(0.5, 0.5, plain(str(absent)), transform=axes.transAxes, ha="center", va="center", wrap=True)
+        return
+    frequency, densities = welch(bodies, bodies.after(source.scenario.output.run_in), segment)
+    S = densities["acceleration"]
+    car, frames, wheelsets = _bodies(source, list(bodies.group["body"].asstr()[:]))
+    looks = {
+        "car, vertical": (Look(BLUE, "-"), car, Z),
+        "car, lateral": (Look(ORANGE, "--"), car, Y),
+        "bogie frames, vertical": (Look(GREEN, "-."), frames, Z),
+        "wheelsets, vertical": (Look(BLACK, ":"), wheelsets, Z),
+    }
+    for words, (look, rows, motion) in looks.items():
+        if rows:
+            _plot(axes, frequency, S[:, rows, motion].mean(axis=1), look, words)
+
+
+def _bodies(source: Train, names: Sequence[str]) -> tuple[list[int], list[int], list[int]]:
+    """Rows of car, frames and wheelsets of the leading vehicle."""
+    vehicles = source.scenario.parts.vehicles
+    prefix = "v1 " if len(vehicles) > 1 else ""
+    loose = [body for body in vehicles[0].body if not body.wheelset]
+    car = max(loose, key=lambda body: body.mass, default=None)
+    axles = len(vehicles[0].axle_positions)
+    wanted = (
+        [f"{prefix}{car.name}"] if car else [],
+        [f"{prefix}{body.name}" for body in loose if body is not car],
+        [f"wheelset {i + 1}" for i in range(axles)],
+    )
+    return tuple([names.index(name) for name in group if name in names] for group in wanted)  # type: ignore[return-value]
+
+
+def _plot(axes: Axes, frequency: Reals, density: Reals, look: Look, words: str) -> None:
+    """Without the mean at 0 Hz; a body at rest, all zero, has no place on a logarithmic axis."""
+    if density[1:].any():
+        axes.loglog(frequency[1:], density[1:], label=words, **look._asdict())
+
+
+def _mark(axes: Axes, marks: dict[str, tuple[float, float]], *, words: bool, limits: tuple[float, float]) -> None:
+    for name, (low, high) in marks.items():
+        if not limits[0] < low <= high < limits[1]:
+            continue
+        axes.axvspan(low, high, color="0.5", linewidth=0.8, alpha=0.6, zorder=0)
+        if words:
+            axes.annotate(
+                f"{name} {low:.3g}{f' to {high:.3g}' if high > 1.001 * low else ''} Hz",
+                (low, 0.0),
+                (-1, 3),
+                xycoords=("data", "axes fraction"),
+                textcoords="offset points",
+                rotation=90,
+                ha="right",
+                va="bottom",
+                fontsize=6.5,
+                color="0.25",
+            )

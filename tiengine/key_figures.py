@@ -1,0 +1,167 @@
+"""What a reader asks first of a run: largest forces, lift-off, what fastenings, mortar and slabs bear; and where."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.figures.extremes import Extremes, read_extremes
+from tiengine.figures.source import AbsentError, Samples, Train
+
+__all__ = ["KeyFigure", "Summary", "key_figures", "summarise"]
+
+Reals = NDArray[np.float64]
+
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class KeyFigure:
+    """One number.
+
+    Attributes:
+        name: What it is.
+        value: In ``unit``.
+        unit: Unit.
+        where: Wheel, seat or slab and chainage; empty if it has no place.
+        smallest: Whether the smaller is the worse.
+    """
+
+    name: str
+    value: float
+    unit: str
+    where: str = ""
+    smallest: bool = False
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One number over many trains.
+
+    Attributes:
+        worst: The worst of all.
+        train: Whose it is.
+        median: Median over the trains.
+        band: 5 and 95 %.
+    """
+
+    worst: KeyFigure
+    train: int
+    median: float
+    band: tuple[float, float]
+
+
+def key_figures(train: Train) -> list[KeyFigure]:
+    """Numbers of one train; what its file does not hold is left out.
+
+    Args:
+        train: The train.
+    """
+    found: list[KeyFigure] = []
+    for part in (_wheels, _seats, _slabs):
+        try:
+            found += part(train)
+        except AbsentError:
+            continue
+    return found
+
+
+def summarise(trains: Sequence[tuple[int, Sequence[KeyFigure]]]) -> list[Summary]:
+    """The worst, the median and the band of every number.
+
+    Args:
+        trains: Numbers of trains and their figures.
+    """
+    groups: dict[str, list[tuple[int, KeyFigure]]] = {}
+    for train, figures in trains:
+        for figure in figures:
+            groups.setdefault(figure.name, []).append((train, figure))
+    summaries = []
+    for entries in groups.values():
+        pick = min if entries[0][1].smallest else max
+        train, worst = pick(entries, key=lambda entry: entry[1].value)
+        low, median, high = np.percentile([figure.value for _, figure in entries], (5.0, 50.0, 95.0))
+        summaries.append(Summary(worst, train, float(median), (float(low), float(high))))
+    return summaries
+
+
+@dataclass
+class _Extreme:
+    """Largest or smallest of a channel over the wheels so far."""
+
+    sign: float
+    value: float = -np.inf
+    where: str = ""
+
+    def take(self, values: Reals, position: Reals, offset: Reals) -> None:
+        """Samples of shape (n, wheelsets, 2)."""
+        i, w, side = np.unravel_index(int(np.argmax(self.sign * values)), values.shape)
+        if self.sign * values[i, w, side] > self.value:
+            self.value = float(self.sign * values[i, w, side])
+            self.where = f"wheelset {w + 1} {SIDES[side]}, chainage {position[i] + offset[w]:.1f} m"
+
+    def figure(self, name: str, **more: Any) -> KeyFigure:
+        return KeyFigure(name, 1e-3 * self.sign * self.value, "kN", self.where, **more)
+
+
+def _wheels(train: Train) -> Iterator[KeyFigure]:
+    samples = train.samples("wheel", "vertical_force", "lateral_force")
+    offset: Reals = samples.group["wheelset_offset"][:]
+    largest, smallest, sideways = _Extreme(1.0), _Extreme(-1.0), _Extreme(1.0)
+    lifted = np.zeros((len(offset), 2))
+    for position, channels in samples.slices(_begin(train, samples)):
+        Q, Y = channels["vertical_force"], np.abs(channels["lateral_force"])
+        largest.take(Q, position, offset)
+        smallest.take(Q, position, offset)
+        sideways.take(Y, position, offset)
+        lifted += (Q <= 0.0).sum(axis=0)
+    yield largest.figure("largest vertical wheel force Q")
+    yield smallest.figure("smallest vertical wheel force Q", smallest=True)
+    yield sideways.figure("largest lateral wheel force |Y|")
+    w, side = np.unravel_index(int(np.argmax(lifted)), lifted.shape)
+    where = f"wheelset {w + 1} {SIDES[side]}" if lifted.any() else ""
+    yield KeyFigure("longest time of a wheel off the rail", 1e3 * float(lifted.max()) * samples.interval, "ms", where)
+
+
+def _begin(train: Train, samples: Samples) -> int:
+    """First sample behind the run-in, or the first of all where nothing is behind it."""
+    begin = samples.after(train.scenario.output.run_in)
+    return begin if begin < len(samples) else 0
+
+
+def _seats(train: Train) -> Iterator[KeyFigure]:
+    seats = read_extremes(train, "seats", "output.envelopes")
+    value, where = _at_largest(seats, seats["largest_vertical_force"], "seat")
+    median = seats.sound_median("largest_vertical_force")
+    yield KeyFigure("largest vertical force on a fastening", 1e-3 * value, "kN", where)
+    yield KeyFigure("largest force on a fastening over the sound median", value / median, "-", where)
+    value, where = _at_largest(seats, -seats["smallest_vertical_force"], "seat")
+    yield KeyFigure("largest uplift of a fastening", max(1e-3 * value, 0.0), "kN", where)
+    sideways = np.maximum(seats["largest_lateral_force"], -seats["smallest_lateral_force"])
+    value, where = _at_largest(seats, sideways, "seat")
+    yield KeyFigure("largest lateral force on a fastening", 1e-3 * value, "kN", where)
+
+
+def _slabs(train: Train) -> Iterator[KeyFigure]:
+    slabs = read_extremes(train, "slabs", "output.envelopes")
+    rows = (
+        ("largest_pressure", "largest mortar pressure", 1e-3, "kPa"),
+        ("largest_deflection", "largest deflection of a slab", 1e3, "mm"),
+        ("largest_moment_x", "largest bending moment along the track", 1e-3, "kN m/m"),
+        ("largest_moment_y", "largest bending moment across the track", 1e-3, "kN m/m"),
+    )
+    for channel, name, scale, unit in rows:
+        value, where = _at_largest(slabs, slabs[channel], "slab")
+        yield KeyFigure(name, scale * value, unit, where)
+
+
+def _at_largest(extremes: Extremes, values: Reals, what: str) -> tuple[float, str]:
+    """Largest value where the train came, and its place."""
+    among = np.where(extremes.reached.reshape(-1, *[1] * (values.ndim - 1)), values, -np.inf)
+    place = np.unravel_index(int(np.argmax(among)), among.shape)
+    side = f" {SIDES[place[1]]}" if values.ndim > 1 else ""
+    return float(among[place]), f"{what} {extremes.index[place[0]]}{side}, chainage {extremes.chainage[place[0]]:.1f} m"

@@ -1,0 +1,222 @@
+"""A result as one HTML page that needs nothing else: no network, no script, pictures inside.
+
+The page is ``tiengine/library/report.html.jinja``; everything that comes from the file is escaped on its way into it.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+import tiengine
+from tiengine.figures.catalogue import KINDS
+from tiengine.figures.source import AbsentError, Train
+from tiengine.figures.style import png
+from tiengine.index import Index
+from tiengine.key_figures import key_figures, summarise
+from tiengine.metrics import Metrics
+from tiengine.metrics_table import notes
+from tiengine.output_file import check_output
+from tiengine.quantity import InputError
+from tiengine.results import COMPLETE
+from tiengine.scenario_words import scenario_words
+from tiengine.screen import summary
+
+if TYPE_CHECKING:
+    from tiengine.results import Result
+
+__all__ = ["render", "write"]
+
+MOST = 100  # rows of failures and events
+
+
+@dataclass(frozen=True)
+class _Picture:
+    name: str
+    title: str
+    look_for: str
+    image: str
+
+
+def render(result: Result, train: int | None = None) -> str:
+    """The page.
+
+    Args:
+        result: An open file.
+        train: Whose figures are drawn; the first that ran to its end if None. Numbers and indices are those of all.
+
+    Returns:
+        HTML.
+
+    Raises:
+        InputError: There is no such train.
+    """
+    done = [i for i in range(result.trains) if result.status(i) == COMPLETE]
+    shown = Train(result, train if train is not None else done[0] if done else 0).number
+    environment = Environment(
+        loader=PackageLoader("tiengine", "library"), autoescape=True, undefined=StrictUndefined, trim_blocks=False
+    )
+    environment.filters.update(number=_number, unit=_unit, verdict=_verdict)
+    several = result.trains > 1
+    pictures, absent = _pictures(result, shown)
+    content = {
+        "title": result.scenario.name,
+        "file": Path(result.name).name,
+        "version": tiengine.__version__,
+        "trains": result.trains,
+        "several": several,
+        "notice": _notice(result),
+        "hint": f"Numbers are those of all trains; figures of one train show train {shown}." if several else "",
+        "scenario": scenario_words(result.scenario),
+        "toml": result.scenario_toml,
+        "figures_of_one": [] if several else key_figures(Train(result, shown)),
+        "summaries": summarise([(i, key_figures(Train(result, i))) for i in done]) if several else [],
+        **_indices(result),
+        "figures": pictures,
+        "absent": absent,
+        "failures": list(result.failures.items()),
+        "events": list(_events(result)),
+        "most": MOST,
+        "facts": list(_facts(result, shown)),
+    }
+    content["contents"] = _contents(content)
+    return environment.get_template("report.html.jinja").render(content)
+
+
+def write(result: Result, path: Path, train: int | None = None) -> None:
+    """Write the page, replacing one.
+
+    Args:
+        result: An open file.
+        path: Where; ends in .html.
+        train: See :func:`render`.
+
+    Raises:
+        InputError: Another suffix, no such train, or a path that cannot be written.
+    """
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"output = {str(path)!r}: its suffix must be .html or .htm")
+    check_output(path, force=True)
+    page = render(result, train)
+    try:
+        path.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"output = {str(path)!r}: cannot be written ({error.strerror or error})") from None
+
+
+def _notice(result: Result) -> str:
+    """What a reader must know before all else."""
+    failed = len(result.failures)
+    if result.trains > 1:
+        return f"{failed} of {result.trains} trains did not run to their end; they are left out." if failed else ""
+    if result.status() == COMPLETE:
+        return ""
+    why = result.status() or "unknown status"
+    return f"The run did not come to its end: {why}. What follows is what was computed until then."
+
+
+def _indices(result: Result) -> dict[str, Any]:
+    """Indices by standard and vehicle, notes, and one sentence on all of them."""
+    try:
+        metrics = result.metrics()
+    except InputError as error:
+        return {"indices": [], "notes": [], "verdict": None, "no_indices": str(error)}
+    spread = metrics.spread()
+    groups: dict[str, list[Any]] = {}
+    vehicles = {each.worst.vehicle for each in spread}
+    for each in spread:
+        vehicle = f"vehicle {each.worst.vehicle}, " if len(vehicles) > 1 else ""
+        groups.setdefault(f"{vehicle}{each.worst.standard}", []).append(each)
+    found = [each.worst for each in spread]
+    return {
+        "indices": list(groups.items()),
+        "notes": notes(found, metrics),
+        "verdict": _all_in_one(found, metrics),
+        "no_indices": "",
+    }
+
+
+def _all_in_one(found: Sequence[Index], metrics: Metrics) -> dict[str, Any]:
+    judged = [index for index in found if index.verdict != "none"]
+    over = [index for index in judged if index.verdict == "over"]
+    of = " (worst of all trains)" if len(metrics.trains) > 1 else ""
+    count = f"{len(judged)} of {len(found)} indices have a value and a limit{of}"
+    if not over:
+        return {"over": False, "words": f"{count}: all are within." if judged else f"{count}."}
+    names = "; ".join(f"{index.standard}, {index.name} at {index.place}" for index in over)
+    return {"over": True, "words": f"{count}: {len(over)} over the limit ({names})."}
+
+
+def _pictures(result: Result, train: int) -> tuple[list[_Picture], list[tuple[str, str]]]:
+    """All figures that the file can give, and why not the others."""
+    pictures, absent = [], []
+    for kind in KINDS:
+        try:
+            image = base64.b64encode(png(kind.draw(result, train))).decode("ascii")
+        except AbsentError as error:
+            absent.append((kind.title, str(error)))
+        else:
+            pictures.append(_Picture(kind.name, kind.title, kind.look_for, image))
+    return pictures, absent
+
+
+def _events(result: Result) -> Iterator[dict[str, Any]]:
+    """Rows of all trains' tables of events; older files have none."""
+    for train in range(result.trains):
+        node = result[f"trains/{train:03d}"]
+        if "events" not in node:
+            continue
+        table = node["events"]
+        messages = table["message"].asstr()[:]
+        for time, position, message in zip(table["time"][:], table["position"][:], messages, strict=True):
+            yield {"train": train, "time": float(time), "position": float(position), "message": str(message)}
+
+
+def _facts(result: Result, train: int) -> Iterator[tuple[str, str]]:
+    """Sizes, times, versions and machine of the run."""
+    attributes = result.attributes
+    yield "file", result.name
+    yield from summary(attributes)
+    yield "status", result.status(train) if result.trains == 1 else f"{len(result.failures)} failures"
+    own = result.facts(train)
+    if "window_length" in own:
+        yield "window", f"{own['window_length']:g} m"
+    for name in ("seed", "modes", "passes", "slabs", "seats_in_window", "trains_together"):
+        if name in own:
+            yield name.replace("_", " "), str(own[name])
+    for name, value in attributes.items():
+        if name.endswith("_version") or name == "platform":
+            yield name.replace("_", " "), str(value)
+
+
+def _contents(content: dict[str, Any]) -> list[tuple[str, str]]:
+    """Anchors and words of the table of contents."""
+    entries = [
+        ("scenario", "Scenario"),
+        ("numbers", "Key figures"),
+        ("indices", "Indices of the standards"),
+        *((f"figure-{picture.name}", picture.title) for picture in content["figures"]),
+    ]
+    if content["several"] or content["failures"] or content["events"]:
+        entries.append(("trains", "Trains"))
+    return [*entries, ("facts", "Run facts")]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _unit(unit: str) -> str:
+    """A unit with its exponent raised."""
+    return unit.replace("^2", "²")
+
+
+def _verdict(index: Index) -> str:
+    """A verdict in words that need no colour."""
+    missing = "no value" if index.value is None else "no limit"
+    return {"within": "within the limit", "over": "OVER THE LIMIT", "none": missing}[index.verdict]

@@ -1,0 +1,117 @@
+"""A scenario in sentences: what runs, over what, with which defects, and how it is computed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tiengine.ensemble import Ensemble
+
+if TYPE_CHECKING:
+    from tiengine.defects import FailedFastenings, MortarDefect
+    from tiengine.scenario import Scenario
+
+__all__ = ["scenario_words"]
+
+
+def scenario_words(scenario: Scenario) -> list[tuple[str, str]]:
+    """Headings and sentences.
+
+    Args:
+        scenario: One train's, or an ensemble's.
+    """
+    rows = [
+        ("Train", _train(scenario)),
+        ("Track", _track(scenario)),
+        ("Irregularity", _irregularity(scenario)),
+        ("Defects", "; ".join(_defects(scenario)) or "none"),
+        ("Numerics", _numerics(scenario)),
+    ]
+    if scenario.ensemble != Ensemble():
+        rows.insert(0, ("Trains", _ensemble(scenario)))
+    if scenario.source:
+        rows.append(("Source", scenario.source))
+    return rows
+
+
+def _train(scenario: Scenario) -> str:
+    train, parts = scenario.train, scenario.parts
+    counts = Counter(vehicle.name for vehicle in parts.vehicles)
+    vehicles = ", ".join(f"{number} x {name}" if number > 1 else name for name, number in counts.items())
+    if isinstance(train.speed_kmh, tuple):
+        speed = ", ".join(f"{v:g} km/h at {x:g} m" for x, v in train.speed_kmh)
+    else:
+        speed = f"{train.speed_kmh:g} km/h"
+    return f"{vehicles} with {parts.wheel.name} wheels, over {train.distance:g} m at {speed}"
+
+
+def _track(scenario: Scenario) -> str:
+    parts, track = scenario.parts, scenario.track
+    slab, fastening = parts.slab, parts.fastening
+    return (
+        f"{parts.rail.name} rails with {parts.rail_profile.name} profile, cant {_cant(track.cant)}, gauge"
+        f" {1e3 * track.gauge:g} mm, friction {track.friction:g}; {fastening.name} fastenings"
+        f" ({1e-6 * fastening.vertical_stiffness:g} kN/mm) every {slab.fastening_pitch:g} m; {slab.name} slabs of"
+        f" {slab.length:g} x {slab.width:g} x {slab.thickness:g} m on a bed of {1e-9 * parts.mortar.stiffness:g} N/mm³"
+        f"{', which does not pull' if parts.mortar.no_tension else ''}"
+    )
+
+
+def _cant(cant: float) -> str:
+    return f"1:{1.0 / cant:g}" if cant > 0.0 else "0"
+
+
+def _irregularity(scenario: Scenario) -> str:
+    track = scenario.irregularity
+    if track.file is not None:
+        words = f"measured, {Path(track.file).name}"
+    elif track.spectrum == "none":
+        words = "none, a smooth track"
+    else:
+        waves = f"waves of {track.wavelength_min:g} to {track.wavelength_max:g} m"
+        words = f"spectrum {track.spectrum}, {waves}, seed {track.seed}"
+    if track.scale != 1.0:
+        words += f", scaled by {track.scale:g}"
+    return words + (f", and short waves down to {track.short_wave_min:g} m" if track.short_wave else "")
+
+
+def _defects(scenario: Scenario) -> Iterator[str]:
+    slab = scenario.parts.slab
+    for row in scenario.track.failed_fastenings:
+        yield _fastenings(row, slab.fastening_pitch)
+    for void in scenario.track.mortar_voids:
+        yield _void(void)
+
+
+def _fastenings(row: FailedFastenings, pitch: float) -> str:
+    first, last = row.seats
+    count = last - first + 1
+    state = "failed" if row.factor == 0.0 else f"at {100.0 * row.factor:g} % of their stiffness"
+    rails = "both rails" if row.rail == "both" else f"the {row.rail} rail"
+    where = f"seat {first}" if count == 1 else f"seats {first} to {last}"
+    begin, end = ((seat + 0.5) * pitch for seat in row.seats)
+    span = f"{begin:.1f} m" if count == 1 else f"{begin:.1f} to {end:.1f} m"
+    return f"{count} {'fastening' if count == 1 else 'fastenings'} of {rails} {state} ({where}, chainage {span})"
+
+
+def _void(void: MortarDefect) -> str:
+    state = "no mortar" if void.factor == 0.0 else f"mortar at {100.0 * void.factor:g} % of its stiffness"
+    area = (void.x[1] - void.x[0]) * (void.y[1] - void.y[0])
+    return f"{state} under {area:.2g} m² of slab {void.slab} (from its rear edge {void.x[0]:g} to {void.x[1]:g} m)"
+
+
+def _numerics(scenario: Scenario) -> str:
+    numerics = scenario.numerics
+    step = "chosen by trial" if numerics.time_step == "auto" else f"{numerics.time_step:g} s"
+    return (
+        f"window of {scenario.window_length:g} m with {scenario.modes} modes a field, time step {step},"
+        f" {numerics.passes} passes, modes left out: {numerics.truncation}, start: {numerics.start}"
+    )
+
+
+def _ensemble(scenario: Scenario) -> str:
+    ensemble = scenario.ensemble
+    varied = ", ".join(f"{key} in {len(values)} values" for key, values in ensemble.vary.items())
+    return f"{ensemble.size} realisations of the irregularity" + (f", {varied}" if varied else "")
