@@ -93,8 +93,9 @@ class Guard:
         """Keep what every look needs."""
         self.model, self.state = self.stepper.model, self.stepper.state
         self._done, self._position = 0, np.zeros(0)
+        self._flying = True  # as far as is known: a checkpoint may have brought wheels in flight
         self.every = max(int(EVERY / self.model.given.newmark.dt + 1e-9), 1)
-        self._rows = [(self.state.motion[row], limit * limit) for row, limit in LIMITS.items()]
+        self._motion = self.state.motion[at.U : at.A + 1].reshape(-1)
         self._shift, self._normal = self.state.contact[..., SHIFT], self.state.force[..., 0]
         table = self.model.given.contact
         self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
@@ -125,22 +126,33 @@ class Guard:
             position: Chainage of the first vehicle's centre [m].
         """
         time = step * self.model.given.newmark.dt
-        if not all(float(np.dot(row, row)) < limit for row, limit in self._rows):  # not a number is not less, either
+        # accelerations are by far the largest, and run away first; not a number is not less, either
+        if not float(np.dot(self._motion, self._motion)) < LIMITS[at.A] ** 2:
             self._runaway(step, time, position)
-        carried = self._normal > 0.0
-        self.watch.lifted += self.every * self.model.given.newmark.dt
-        self.watch.lifted[carried] = 0.0
-        climbs = self._shift > self._climb
-        if climbs.any():
-            shift = f"beyond {self._climb * 1e3:.1f} mm"
-            self._wheels(1, climbs & carried, step, time, position, f"climbs on its flange: lateral shift {shift}")
-            words = f"derailed: lateral shift beyond {self._derailed * 1e3:.1f} mm on the flange side"
-            self._wheels(0, self._shift > self._derailed, step, time, position, words)
-        lasting = self.watch.lifted >= self.policy.wheel_lift_time
-        if lasting.any():
-            self._wheels(2, lasting, step, time, position, f"off the rail for {self.policy.wheel_lift_time:g} s")
+        if not self._normal.min() > 0.0:
+            self._lifts(step, time, position)
+        elif self._flying:
+            self.watch.lifted[:], self._flying = 0.0, False
+        if self._shift.max() > self._climb:
+            self._climbs(step, time, position)
         if position + self._wheel_front > self._nearest_end:
             self._track_ends(step, time, position)
+
+    def _lifts(self, step: int, time: float, position: float) -> None:
+        """Wheels that carry nothing, for how long."""
+        lifted, self._flying = self.watch.lifted, True
+        lifted += self.every * self.model.given.newmark.dt
+        lifted[self._normal > 0.0] = 0.0
+        lasting = lifted >= self.policy.wheel_lift_time
+        self._wheels(2, lasting, step, time, position, f"off the rail for {self.policy.wheel_lift_time:g} s")
+
+    def _climbs(self, step: int, time: float, position: float) -> None:
+        """Wheels beyond the steepest part of their flange, or beyond their profile."""
+        climbs = (self._shift > self._climb) & (self._normal > 0.0)
+        words = f"climbs on its flange: lateral shift beyond {self._climb * 1e3:.1f} mm"
+        self._wheels(1, climbs, step, time, position, words)
+        words = f"derailed: lateral shift beyond {self._derailed * 1e3:.1f} mm on the flange side"
+        self._wheels(0, self._shift > self._derailed, step, time, position, words)
 
     def take(self) -> dict[int, list[Event]]:
         """Events since the last call, by place of the train."""
