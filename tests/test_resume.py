@@ -147,7 +147,10 @@ def test_a_checkpoint_of_something_else_is_refused(tmp_path: Path):
     kept, good = contents(path), Checkpoint.read(checkpoint_path(path, 0))
     for damage, rule in (
         (lambda: checkpoint_path(path, 0).write_bytes(b"PK nonsense"), "not a checkpoint, or damaged"),
-        (lambda: write_facts(path, {**good.facts, "version": 99}, good), "checkpoint version = 99: this program reads 1"),
+        (
+            lambda: write_facts(path, {**good.facts, "version": 99}, good),
+            "checkpoint version = 99: this program reads 1",
+        ),
         (
             lambda: Checkpoint(0, good.facts, {**good.arrays, "state.force": np.zeros((9, 9))}).write(path),
             "does not fit the scenario",

@@ -6,6 +6,7 @@ only by ``run`` and ``profile``, so that the others answer at once.
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 from collections.abc import Iterator, Sequence
@@ -120,10 +121,15 @@ def contact(
     """Show how WHEEL and RAIL, presets or files, touch: rolling radii, conicity, points of contact."""
     from tiengine.contact_geometry import ContactSettings
     from tiengine.contact_report import contact_report, draw
+    from tiengine.output_file import check_output
     from tiengine.profile import ROUNDING_LENGTH, load_profile
     from tiengine.quantity import build
 
     length = ROUNDING_LENGTH if smoothing is None else smoothing
+    if not math.isfinite(length):  # click takes it for one within the range
+        raise InputError(f"smoothing = {length}: must be a finite number")
+    if output is not None:
+        check_output(output, force=True)
     report = contact_report(
         load_profile(wheel, "wheel", smoothing=length, tape_circle=tape_circle),
         load_profile(rail, "rail", smoothing=length, has_cant=canted, mirror=mirror_rail),

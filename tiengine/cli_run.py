@@ -6,10 +6,11 @@ signal n (130 Ctrl-C, 143 SIGTERM), to be resumed.
 
 from __future__ import annotations
 
+import os
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -143,7 +144,9 @@ def _stopped_by_signals(console: Console) -> Iterator[_Stop]:
         if stop.asked:
             raise SystemExit(128 + number)
         stop.number = number
-        console.print("stopping after these steps; once more to leave at once")
+        if not console.quiet:  # to the system: a handler may come in the middle of anything that prints
+            with suppress(OSError):  # a terminal that was closed
+                os.write(2, b"stopping after these steps; once more to leave at once\n")
 
     previous = {number: signal.signal(number, ask) for number in SIGNALS}
     try:

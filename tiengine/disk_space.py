@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from pathlib import Path
 
+import numpy as np
+
+from tiengine.channels import DOFS
+from tiengine.deflection import window_points
+from tiengine.groups import CHUNK
 from tiengine.quantity import InputError
+from tiengine.recorder import Recorder
 from tiengine.scenario import Scenario
+from tiengine.trackside import trackside_groups
 
-__all__ = ["check_space", "estimated_bytes"]
+__all__ = ["check_space", "duration", "estimated_bytes"]
 
-SHORTEST_STEP = 2e-4
+USUAL_STEP = 2e-4
 """Step [s] that "auto" means here: it tries longer ones first."""
 
-SLACK = 1.1
-"""Of HDF5: half-filled chunks, indices; 3 to 8 % measured on runs of 100 m to 5 km."""
+SLACK = 1.05
+"""For events, journal and checkpoints; without it, files of 2 to 14 MB came within 0.7 %."""
 
-PER_TRAIN = 300_000
-"""Bytes of a train that do not grow with its way: labels, attributes, first chunks."""
+OF_DATASET = 2_100
+"""Bytes of a dataset besides its samples: header, attributes, scales; 1.5 to 2.0 kB measured."""
 
-POINTS_PER_METRE = 4
-"""Of the deflected track."""
+OF_CHUNK = 60
+"""Bytes of a chunk besides its samples: its place in the index, half-filled."""
 
 
 def estimated_bytes(scenario: Scenario) -> int:
@@ -29,7 +37,7 @@ def estimated_bytes(scenario: Scenario) -> int:
     Args:
         scenario: All trains.
     """
-    return round(SLACK * sum(PER_TRAIN + _bytes_of(train) for train in scenario.members))
+    return round(SLACK * sum(_bytes_of(train) for train in scenario.members))
 
 
 def check_space(scenario: Scenario, path: Path) -> None:
@@ -50,31 +58,72 @@ def check_space(scenario: Scenario, path: Path) -> None:
         )
 
 
-def _bytes_of(scenario: Scenario) -> float:
-    """Samples of one train."""
-    out, vehicles = scenario.output, scenario.parts.vehicles
-    real = {"single": 4, "double": 8}[out.precision]
-    step = scenario.numerics.time_step
-    dt = SHORTEST_STEP if step == "auto" else float(step)
-    duration = scenario.train.distance / min(scenario.train.speed.speed)
-    wheels = 2 * len(out.wheel_channels) + 2 * len(out.irregularity_channels)
-    bodies = 5 * len(out.body_channels)
-    slots = scenario.window_length / scenario.parts.slab.pitch + 2
-    per_wheel_sample = 16 + real * wheels * 4 * len(vehicles)
-    per_body_sample = 16 + real * (bodies * 7 * len(vehicles) + 3 * slots)
-    found = duration / _interval(out.wheel_interval, dt) * per_wheel_sample
-    found += duration / _interval(out.body_interval, dt) * per_body_sample
-    if out.envelopes:
-        slab = scenario.parts.slab
-        found += scenario.train.distance * ((12 + 10 * real) / slab.fastening_pitch + (12 + 9 * real) / slab.pitch)
-    if out.deflection_interval != "none":
-        points = POINTS_PER_METRE * scenario.window_length
-        found += duration / float(out.deflection_interval) * (16 + 4 * points * real)
-    return float(found)
+def duration(train: Scenario) -> float:
+    """Time that the way of one train takes [s].
+
+    Args:
+        train: Its scenario.
+    """
+    start = train.rear + train.centre_in_window
+    x = np.linspace(start, start + train.train.distance, 200)
+    slowness = np.array([1.0 / train.train.speed.at(float(here))[0] for here in x])
+    return float(np.trapezoid(slowness, x))
+
+
+def _bytes_of(train: Scenario) -> float:
+    """One train."""
+    real = {"single": 4, "double": 8}[train.output.precision]
+    found = 0.0
+    for name, spec in (Recorder.groups_of(train) | trackside_groups(train)).items():
+        rows, sample = _rows(train, name), math.prod(_length(train, name, each) for each in spec.dimensions)
+        found += len(spec.channels) * _grown(rows, spec.chunk, sample * real)
+        if spec.times_of is None:
+            found += 2 * _grown(rows, CHUNK, 8)
+        found += OF_DATASET * len(spec.dimensions)
+    return found
+
+
+def _grown(rows: float, chunk: int, sample: int) -> float:
+    """A dataset of so many rows; HDF5 keeps whole chunks."""
+    chunks = math.ceil(rows / chunk)
+    return OF_DATASET + chunks * (chunk * sample + OF_CHUNK)
+
+
+def _rows(train: Scenario, group: str) -> float:
+    """Samples of a group."""
+    out, slab = train.output, train.parts.slab
+    step = train.numerics.time_step
+    dt = USUAL_STEP if step == "auto" else float(step)
+    way, time = train.train.distance, duration(train)
+    match group.partition("/")[0]:
+        case "wheel" | "irregularity":
+            return time / _interval(out.wheel_interval, dt)
+        case "body" | "mortar":
+            return time / _interval(out.body_interval, dt)
+        case "seats":
+            return (way + train.window_length) / slab.fastening_pitch
+        case "slabs":
+            return (way + train.window_length) / slab.pitch + 1
+        case "deflection":
+            return time / float(out.deflection_interval)
+        case _:  # a gauge, while it is in the window
+            return float(min(time, train.window_length / min(train.train.speed.speed)) / dt)
+
+
+def _length(train: Scenario, group: str, dimension: str) -> int:
+    """Of a dimension besides the one that grows."""
+    vehicles = len(train.parts.vehicles)
+    return {
+        "wheelset": 4 * vehicles,
+        "body": 7 * vehicles,
+        "dof": len(DOFS),
+        "slot": int(train.window_length / train.parts.slab.pitch) + 2,
+        "point": len(window_points(train.window_length)),
+    }.get(dimension, 2)
 
 
 def _interval(given: float | str, dt: float) -> float:
-    return dt if isinstance(given, str) else max(given, dt)
+    return dt if isinstance(given, str) else max(round(given / dt), 1) * dt
 
 
 def _size(count: int) -> str:

@@ -3,19 +3,38 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 from pydantic import BeforeValidator
 
-__all__ = ["channel_names", "check_speed", "number_or"]
+__all__ = ["NumberOr", "channel_names", "check_speed", "number_or"]
 
 
 def _finite(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and -math.inf < value < math.inf  # a whole number may be too large for a float
 
 
-def number_or(word: str, unit: str, low: float, high: float) -> BeforeValidator:
+@dataclass(frozen=True)
+class NumberOr(BeforeValidator):
+    """Check of a key that is one word or a number within a range, and its words for the manual.
+
+    Attributes:
+        word: The word.
+        unit: SI unit of the number.
+        low: Smallest number.
+        high: Largest number.
+    """
+
+    word: str = ""
+    unit: str = "-"
+    low: float = -math.inf
+    high: float = math.inf
+
+
+def number_or(word: str, unit: str, low: float, high: float) -> NumberOr:
     """Either one word or a number in ``low .. high``."""
 
     def check(value: Any) -> Any:
@@ -25,7 +44,7 @@ def number_or(word: str, unit: str, low: float, high: float) -> BeforeValidator:
             raise ValueError(f"must be {word!r} or a number between {low:g} and {high:g} {unit}")
         return float(value)
 
-    return BeforeValidator(check)
+    return NumberOr(check, word=word, unit=unit, low=low, high=high)
 
 
 def check_speed(value: Any) -> Any:
@@ -56,6 +75,8 @@ def channel_names(known: dict[str, Any]) -> BeforeValidator:
         for name in value:
             if name not in known:
                 raise ValueError(f"no such channel {name!r}; known: {', '.join(known)}")
+        if len(set(value)) < len(value):
+            raise ValueError("must name each channel once")
         return value
 
     return BeforeValidator(check)

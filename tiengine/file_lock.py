@@ -35,6 +35,8 @@ def locked(path: Path) -> FileLock:
     try:
         lock.acquire()
     except Timeout:
+        if not Path(lock.lock_file).exists():  # filelock tries again where nothing can be made, /proc for example
+            raise InputError(f"output = '{path}': cannot be written (no lock can be made beside it)") from None
         raise InputError(f"output = '{path}': another run is writing it") from None
     except OSError as error:
         raise InputError(f"output = '{path}': cannot be written ({error})") from None

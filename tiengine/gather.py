@@ -9,9 +9,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tiengine.checkpoint import Checkpoint, checkpoint_path
+from tiengine.disk_space import duration
 from tiengine.events import Event
 from tiengine.memory import peak_memory
 from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
@@ -26,7 +25,10 @@ Progress = Callable[[float, float], None]
 Tell = Callable[[str], None]
 
 FLUSH_SECONDS = 5.0
-"""Wall time after which what was written is made permanent: a commit takes some 20 ms."""
+"""Wall time after which what was written is made permanent: a commit takes some 20 ms for one train."""
+
+COMMIT_SHARE = 0.01
+"""Of the wall time that commits may take: on a slow disk, or with many trains, they are rarer."""
 
 ONLY_OF_TRAINS = ("wall_time_loop", "trains_together", "status", "vehicles")
 
@@ -63,12 +65,12 @@ class Gathering:
         self.ended: set[int] = set()
         self._path = path
         self.tell: Tell = tell or (lambda words: None)
-        self._committed = time.perf_counter()
+        self._committed, self._pause = time.perf_counter(), FLUSH_SECONDS
         self.failed: dict[int, str] = {}
         self.refused: set[int] = set()
         self._writer, self._progress = writer, progress
         self._simulated = dict.fromkeys(range(len(scenario.members)), 0.0)
-        self._whole = [_duration(train) for train in scenario.members]
+        self._whole = [duration(train) for train in scenario.members]
         self._facts: dict[int, dict[str, Any]] = {i: {} for i in self._simulated}
         self._costs: list[Costs] = []
         self._writing = 0.0
@@ -105,7 +107,7 @@ class Gathering:
                     self._simulated[train] = now
                 self._note(events)
                 self._fail(failed)
-                if clock - self._committed >= FLUSH_SECONDS:
+                if clock - self._committed >= self._pause:
                     self._commit()
             case Saved(trains, checkpoint):
                 self._save(trains, checkpoint)
@@ -189,8 +191,10 @@ class Gathering:
             raise InputError(f"output = '{self._path}': its checkpoint cannot be written ({error})") from None
 
     def _commit(self) -> None:
+        clock = time.perf_counter()
         self._writer.commit()
         self._committed = time.perf_counter()
+        self._pause = max(FLUSH_SECONDS, (self._committed - clock) / COMMIT_SHARE)
 
     def _forget(self, task: int) -> None:
         """A task has ended: its checkpoint is of no more use."""
@@ -237,11 +241,3 @@ class Gathering:
         first, *others = [known for known in self._facts.values() if known] or [{}]
         rows = {key: value for key, value in first.items() if key not in ONLY_OF_TRAINS}
         return {key: value for key, value in rows.items() if all(known.get(key) == value for known in others)}
-
-
-def _duration(train: Scenario) -> float:
-    """Time that the way takes [s], for the progress bar."""
-    start = train.rear + train.centre_in_window
-    x = np.linspace(start, start + train.train.distance, 200)
-    slowness = np.array([1.0 / train.train.speed.at(float(here))[0] for here in x])
-    return float(np.trapezoid(slowness, x))

@@ -41,7 +41,7 @@ class Gauge(Params):
     on: Literal["rail", "slab", "fastening"]
     chainage: Annotated[float, Q("m", ge=0)]
     side: Literal["left", "right"] | None = None
-    y: Annotated[float | None, Field(allow_inf_nan=False, json_schema_extra={"unit": "m"})] = None
+    y: Annotated[float | None, Field(json_schema_extra={"unit": "m"})] = None
 
     @field_validator("name")
     @classmethod

@@ -80,7 +80,8 @@ class IrregularityParams(Params):
     short_wave_min: Annotated[float, Q("m", "shortest wave of the rail roughness", gt=0, validate_default=True)] = 0.08
     taper: Annotated[float, Q("m", "length over which the irregularity begins", gt=0)] = 30.0
     file: Annotated[
-        str | None, Field(description="measured track as CSV (docs/files.md), relative to the scenario")
+        str | None,
+        Field(description="measured track as CSV (docs/files.md), relative to the scenario", max_length=4096),
     ] = None
     file_unit: Annotated[Literal["m", "mm"], Field(description="of columns that state none")] = "m"
     file_start: Annotated[float | None, Q("m", "mileage of the file at chainage zero")] = None

@@ -7,6 +7,7 @@ its name only once it holds something.
 
 from __future__ import annotations
 
+import errno
 import os
 import platform
 import uuid
@@ -31,6 +32,9 @@ __all__ = ["OutputFile", "check_output", "header"]
 
 LIBRARY = ("v110", "v110")
 """File format of HDF5 1.10: the first whose own structures carry checksums, so that a damaged file is found out."""
+
+DISK_ERRORS = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS") if hasattr(errno, name)}
+"""What the system says when a disk is full or gone."""
 
 PACKAGES = ("numpy", "scipy", "taichi", "h5py", "pydantic")
 
@@ -136,6 +140,7 @@ class OutputFile:
                 if result.finished:
                     _remove_checkpoints(path)
                     raise InputError(f"{path}: is complete; there is nothing to resume")
+                result.check()
             journalled = JournalledFile(path, fresh=False)
             return cls(path, _opened(journalled, "r+"), journalled, lock)
         except OSError as error:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tiengine.presets import to_tuples
+from tiengine.input_files import DEEPEST, plain_toml, to_tuples
 from tiengine.quantity import InputError
 
 __all__ = ["Overrides", "apply_overrides", "parse_value"]
+
+MOST_DIGITS = 9  # of an index
 
 Overrides = Mapping[str, Any] | Sequence[str]
 """Either ``{"train.speed_kmh": 300.0}``, nested tables, or texts ``"train.speed_kmh=300"``."""
@@ -32,21 +33,29 @@ def apply_overrides(tables: dict[str, Any], overrides: Overrides) -> dict[str, A
         InputError: A text without ``=``, or a key that goes on into a number.
     """
     for key, value in _pairs(overrides):
+        if key.count(".") >= DEEPEST:
+            raise InputError(f"--set {key[:40]}...: must have at most {DEEPEST} parts")
         tables = _replaced(tables, key.split("."), value, key)
     return tables
 
 
-def parse_value(text: str) -> Any:
+def parse_value(text: str, key: str = "") -> Any:
     """Value of a TOML text; a bare word that is not TOML is taken as a string.
 
     Args:
         text: ``300``, ``[1, 2]``, ``true``, ``{factor = 0.5}``, ``explicit``.
+        key: Its key for messages.
+
+    Raises:
+        InputError: It is nested too deep.
     """
     try:
-        parsed = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+        parsed = plain_toml(f"value = {text}", f"--set {key[:80]}")
+    except InputError:
+        raise
+    except ValueError:
         return text.strip()
-    return to_tuples(parsed["value"]) if list(parsed) == ["value"] else text
+    return to_tuples(parsed["value"], key) if list(parsed) == ["value"] else text
 
 
 def _pairs(overrides: Overrides, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -56,13 +65,15 @@ def _pairs(overrides: Overrides, prefix: str = "") -> Iterator[tuple[str, Any]]:
             key, equals, value = text.partition("=")
             if not equals or not key.strip():
                 raise InputError(f"--set {text!r}: must be KEY=VALUE, such as train.speed_kmh=300")
-            yield key.strip(), parse_value(value)
+            yield key.strip(), parse_value(value, key.strip())
         return
     for key, value in overrides.items():
+        if prefix.count(".") >= DEEPEST:
+            raise InputError(f"{prefix[:40]}...: nested deeper than {DEEPEST} tables")
         if isinstance(value, Mapping) and value:
             yield from _pairs(value, f"{prefix}{key}.")
         else:
-            yield f"{prefix}{key}", to_tuples(value)
+            yield f"{prefix}{key}", to_tuples(value, f"{prefix}{key}")
 
 
 def _replaced(node: Any, path: list[str], value: Any, key: str) -> Any:
@@ -75,7 +86,7 @@ def _replaced(node: Any, path: list[str], value: Any, key: str) -> Any:
     if isinstance(node, str):  # the name of a preset, of which one key is changed
         return {"like": node, head: _replaced({}, rest, value, key)}
     if isinstance(node, tuple):
-        if not head.isdecimal() or int(head) >= len(node):
+        if not head.isdecimal() or len(head) > MOST_DIGITS or int(head) >= len(node):
             raise InputError(f"--set {key}: {head!r} must be an index between 0 and {len(node) - 1}")
         return tuple(_replaced(item, rest, value, key) if i == int(head) else item for i, item in enumerate(node))
     raise InputError(f"--set {key}: {head!r} lies below a value that is not a table ({node!r})")

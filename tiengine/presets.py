@@ -7,27 +7,31 @@ its bare name (``"CHN60"``) or by the path of a file of the same form (``"my_rai
 from __future__ import annotations
 
 import difflib
-import tomllib
 from importlib import resources
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
+from tiengine.input_files import LARGEST_TOML, parse_toml, read_bytes
 from tiengine.quantity import InputError
 
 __all__ = [
     "KINDS",
+    "LONGEST_PATH",
     "find_preset",
+    "is_file",
     "load_toml",
     "nearest",
     "preset_names",
     "preset_source",
     "read_text",
-    "to_tuples",
+    "user_path",
 ]
 
 KINDS = ("vehicles", "rails", "slabs", "fastenings", "profiles", "irregularity", "scenarios")
 """Folders of the library."""
+
+LONGEST_PATH = 1000  # characters of a name or path in a scenario
 
 _SUFFIXES = {"profiles": (".csv",)}  # every other kind is TOML
 _PATH_SUFFIXES = (".toml", ".csv", ".txt", ".dat", ".prw", ".prr", ".whl", ".ban")  # of files named in a scenario
@@ -61,7 +65,8 @@ def preset_names(kind: str) -> list[str]:
 def find_preset(kind: str, name_or_path: str, suffix: str = "", folder: Path | None = None, called: str = "") -> Path:
     """File of a preset of the library or of the user.
 
-    A text with a slash or the kind's suffix is a path, anything else a name of the library.
+    A text with a slash or the kind's suffix is a path, anything else a name of the library. Paths may be absolute,
+    begin with ``~`` or lead out of the folder: files are only read (:mod:`tiengine.input_files`).
 
     Args:
         kind: One of :data:`KINDS`.
@@ -80,15 +85,46 @@ def find_preset(kind: str, name_or_path: str, suffix: str = "", folder: Path | N
     called = called or kind
     if not isinstance(name_or_path, str) or not name_or_path:
         raise InputError(f"{called} = {name_or_path!r}: must be the name of a preset or the path of a file")
+    if len(name_or_path) > LONGEST_PATH:
+        raise InputError(f"{called} = {name_or_path[:60]!r}...: must have at most {LONGEST_PATH} characters")
     library = library_folder(kind) / f"{name_or_path}{suffix}"
     if _is_path(name_or_path, suffix):
-        path = (folder or Path()) / Path(name_or_path).expanduser()
-        if path.is_file():
+        path = user_path(name_or_path, folder, called)
+        if is_file(path):
             return path
         raise InputError(f"{called} = {name_or_path!r}: no such file ({path})")
-    if library.is_file():
+    if is_file(library):
         return library
     raise InputError(f"{called} = {name_or_path!r}: no such preset{nearest(name_or_path, preset_names(kind))}")
+
+
+def user_path(text: str, folder: Path | None, called: str) -> Path:
+    """A path that a user wrote.
+
+    Args:
+        text: Absolute, or relative to ``folder``; ``~`` is the home folder.
+        folder: The folder of the scenario file; the working directory if None.
+        called: What the message calls it.
+
+    Raises:
+        InputError: ``~`` stands for nobody.
+    """
+    try:
+        return (folder or Path()) / Path(text).expanduser()
+    except RuntimeError as error:
+        raise InputError(f"{called} = {text!r}: {error}") from None
+
+
+def is_file(path: Path) -> bool:
+    """Whether a regular file is there; no for names that no file can have.
+
+    Args:
+        path: What was asked for.
+    """
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def _is_path(text: str, suffix: str) -> bool:
@@ -123,15 +159,9 @@ def load_toml(path: Path | str) -> dict[str, Any]:
         The tables, nested; numbers, texts, booleans and tuples.
 
     Raises:
-        InputError: The file is missing, unreadable or not TOML; the message names file and line.
+        InputError: The file is missing, unreadable, too large or not TOML; the message names file and line.
     """
-    text = read_text(path)
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        message = str(error)
-        raise InputError(f"{path}: not valid TOML: {message[0].lower()}{message[1:]}") from None
-    return {key: to_tuples(value) for key, value in tables.items()}
+    return parse_toml(read_text(path), str(path))
 
 
 def read_text(path: Path | str) -> str:
@@ -141,23 +171,12 @@ def read_text(path: Path | str) -> str:
         path: The file.
 
     Raises:
-        InputError: The file is missing, unreadable or not UTF-8.
+        InputError: The file is missing, no regular file, too large or not UTF-8.
     """
     try:
-        return Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+        return read_bytes(path, str(path), LARGEST_TOML).decode("utf-8")
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a UTF-8 text file") from None
-
-
-def to_tuples(value: Any) -> Any:
-    """The value with every list in it, at any depth, turned into a tuple."""
-    if isinstance(value, dict):
-        return {key: to_tuples(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return tuple(to_tuples(item) for item in value)
-    return value
 
 
 def preset_source(kind: str, name: str) -> str:

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
+from tiengine.presets import is_file
 from tiengine.profile_files import read_profile
 from tiengine.profile_frame import FEWEST_POINTS, Kind, increasing_run, placed, smoothing_curve
 from tiengine.quantity import InputError
@@ -207,7 +208,7 @@ def load_profile(
     name = str(name_or_path)
     if name in profile_names():
         path = Path(str(resources.files("tiengine.library") / "profiles" / f"{name}.csv"))
-    elif Path(name).is_file():
+    elif is_file(Path(name)):
         path = Path(name)
     else:
         close = difflib.get_close_matches(name, profile_names(), n=1, cutoff=0.3)

@@ -22,14 +22,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.input_files import LARGEST_PROFILE, numbers_of, read_text_file
 from tiengine.profile_frame import FEWEST_POINTS, Kind, PointList, check_kinks, oriented
 from tiengine.quantity import InputError
 
-__all__ = ["FORMATS", "read_profile", "read_text_file"]
+__all__ = ["FORMATS", "MOST_POINTS", "read_profile"]
 
 Reals = NDArray[np.float64]
 
-LARGEST_FILE = 10_000_000  # bytes
+MOST_POINTS = 20_000  # a laser gives some thousand
+LARGEST_FACTOR = 1e6  # of units
 WIDTH = (10.0, 400.0)  # mm, what a list of points may span
 Lines = Sequence[tuple[int, str]]
 """Numbered lines."""
@@ -50,10 +52,12 @@ def read_profile(path: str | Path, kind: Kind, where: str = "") -> PointList:
         InputError: The file breaks a rule; the message names the file, the line and the rule.
     """
     where = where or f"{kind} profile {str(path)!r}"
-    lines = list(enumerate(read_text_file(path, where, LARGEST_FILE).splitlines(), start=1))
+    lines = list(enumerate(read_text_file(path, where, LARGEST_PROFILE).splitlines(), start=1))
     found = FORMATS.get(Path(path).suffix.lower(), _read_columns)(lines, kind, where)
     if len(found.points) < FEWEST_POINTS:
         raise InputError(f"{where}: {len(found.points)} points; at least {FEWEST_POINTS} pairs expected")
+    if len(found.points) > MOST_POINTS:
+        raise InputError(f"{where}: {len(found.points)} points; at most {MOST_POINTS} expected")
     width = float(np.ptp(found.points[:, 0]))
     if not WIDTH[0] <= width <= WIDTH[1]:
         raise InputError(f"{where}: {width:g} mm wide; {WIDTH[0]:g} to {WIDTH[1]:g} mm expected: are its units right?")
@@ -67,40 +71,6 @@ def read_profile(path: str | Path, kind: Kind, where: str = "") -> PointList:
     found = oriented(found, kind)
     check_kinks(found, kind)
     return found
-
-
-def read_text_file(path: str | Path, where: str, largest: int) -> str:
-    """A text of bounded size; what is not UTF-8 is read as Latin-1, which only comments may need.
-
-    Args:
-        path: The file.
-        where: Its name for messages.
-        largest: Greatest size [bytes].
-
-    Raises:
-        InputError: The file cannot be read, is too large, or is no text.
-    """
-    try:
-        with open(path, "rb") as file:
-            data = file.read(largest + 1)
-    except OSError as error:
-        raise InputError(f"{where}: cannot be read ({error.strerror or error})") from None
-    if len(data) > largest:
-        raise InputError(f"{where}: larger than {largest / 1e6:g} MB, which no such file is")
-    if b"\0" in data:
-        raise InputError(f"{where}: line {data[: data.index(0)].count(10) + 1}: not a text file")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
-
-
-def _numbers(fields: Sequence[str]) -> list[float] | None:
-    """The fields as numbers, None if one is not."""
-    try:
-        return [float(field) for field in fields]
-    except ValueError:
-        return None
 
 
 def _point_list(rows: Sequence[Sequence[float]], numbers: Sequence[int], where: str) -> PointList:
@@ -127,7 +97,7 @@ def _read_columns(lines: Lines, kind: Kind, where: str) -> PointList:
         fields = line.split("#")[0].replace(",", " ").replace(";", " ").split()
         if not fields:
             continue
-        values = _numbers(fields)
+        values = numbers_of(fields)
         if values is None or len(values) != 2:
             raise InputError(f"{where}: line {number} is {line.strip()[:80]!r}; two numbers, y and z in mm, expected")
         rows.append(values)
@@ -155,7 +125,7 @@ def _read_miniprof(lines: Lines, kind: Kind, where: str) -> PointList:
     columns: tuple[int, int] | None = None
     for number, line in lines:
         text = re.split('["!%]', line)[0].strip()
-        values = _numbers(text.replace(",", " ").replace(";", " ").split())
+        values = numbers_of(text.replace(",", " ").replace(";", " ").split())
         if not text or (values is None and not rows):
             key, equals, value = text.partition("=")
             if equals:
@@ -168,7 +138,7 @@ def _read_miniprof(lines: Lines, kind: Kind, where: str) -> PointList:
             )
         rows.append([values[column] for column in columns])
         numbers.append(number)
-    promised = _numbers([header.get("xypoints", "")])
+    promised = numbers_of([header.get("xypoints", "")])
     if promised and promised[0] > len(rows):
         last = numbers[-1] if numbers else len(lines)
         raise InputError(f"{where}: line {last}: {len(rows)} points; XYPoints = {promised[0]:g} are expected")
@@ -201,7 +171,7 @@ def _read_simpack(lines: Lines, kind: Kind, where: str) -> PointList:
             key, _, value = text.partition("=")
             keys[f"{section[-1] if section else ''}:{key.strip().lower()}"] = (number, value.strip())
         elif text and section[-1:] == ["point"]:
-            values = _numbers(text.split())
+            values = numbers_of(text.split())
             if values is None or len(values) < 2:
                 raise InputError(f"{where}: line {number} is {line.strip()[:80]!r}; y, z and a weight expected")
             rows.append(values[:2])
@@ -217,7 +187,7 @@ def _read_simpack(lines: Lines, kind: Kind, where: str) -> PointList:
 def _simpack_number(keys: dict[str, tuple[int, str]], key: str, default: float, where: str) -> float:
     """Value of a key."""
     number, text = keys.get(key, (0, str(default)))
-    values = _numbers([text])
+    values = numbers_of([text])
     if values is None or not np.isfinite(values[0]):
         raise InputError(f"{where}: line {number}: {key.partition(':')[2]} = {text!r}: must be a number")
     return values[0]
@@ -231,9 +201,12 @@ def _simpack_processed(found: PointList, keys: dict[str, tuple[int, str]]) -> Po
 
     per_metre, per_radian = value("units.len.f", 1000.0), value("units.ang.f", 1.0)
     for name, factor in (("units.len.f", per_metre), ("units.ang.f", per_radian)):
-        if factor <= 0.0:
+        if not 0.0 < factor <= LARGEST_FACTOR:
             line = keys[f"spline:{name}"][0]
-            raise InputError(f"{found.where}: line {line}: {name} = {factor:g}: must be > 0")
+            raise InputError(f"{found.where}: line {line}: {name} = {factor:g}: must be > 0 and <= {LARGEST_FACTOR:g}")
+        if factor < 1.0 / LARGEST_FACTOR:
+            line = keys[f"spline:{name}"][0]
+            raise InputError(f"{found.where}: line {line}: {name} = {factor:g}: must be >= {1.0 / LARGEST_FACTOR:g}")
     points, lines = found.points, found.lines
     if (least := value("point.dist.min")) > 0.0:
         kept = [0]

@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from tiengine.input_files import LARGEST_TOML, read_bytes
 from tiengine.machine import Machine
 from tiengine.quantity import InputError
 from tiengine.roofs import Roofs
@@ -176,10 +177,10 @@ def read_json(path: Path) -> ProfileReport:
     """
     name = f"profile = '{path}'"
     try:
-        tables = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read ({error.strerror})") from None
-    except ValueError as error:
+        tables = json.loads(read_bytes(path, name, LARGEST_TOML))
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{name}: must be a JSON file ({error})") from None
     if not isinstance(tables, dict) or tables.pop("format", None) != FORMAT:
         raise InputError(f"{name}: must be a file that 'tiengine profile --json' wrote")

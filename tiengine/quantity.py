@@ -13,13 +13,15 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-__all__ = ["InputError", "Params", "Q", "build", "explain"]
+__all__ = ["InputError", "Name", "Params", "PlainName", "Q", "Source", "build", "explain"]
 
 M = TypeVar("M", bound=BaseModel)
+
+LONGEST_MESSAGE = 1500  # characters
 
 _WORDS = {
     "Value error, ": "",
@@ -34,7 +36,16 @@ _WORDS = {
 
 
 class InputError(ValueError):
-    """Input that breaks a rule; the message is one line naming object, value and rule."""
+    """Input that breaks a rule; the message is one line naming object, value and rule, and not the whole input."""
+
+    def __init__(self, message: str) -> None:
+        """Shorten what quotes too much.
+
+        Args:
+            message: The sentence.
+        """
+        head, tail = message[: LONGEST_MESSAGE // 2], message[-LONGEST_MESSAGE // 2 :]
+        super().__init__(message if len(message) <= LONGEST_MESSAGE else f"{head} ... {tail}")
 
 
 def Q(unit: str, description: str = "", **rule: Any) -> Any:
@@ -48,13 +59,31 @@ def Q(unit: str, description: str = "", **rule: Any) -> Any:
     Returns:
         A pydantic ``Field`` carrying the unit in its JSON schema.
     """
-    return Field(description=description or None, json_schema_extra={"unit": unit}, allow_inf_nan=False, **rule)
+    return Field(description=description or None, json_schema_extra={"unit": unit}, **rule)
+
+
+def _check_plain(name: str) -> str:
+    if any(mark in name for mark in "/\\\n\t\r"):
+        raise ValueError("must be one line without slashes, as files are called after it")
+    return name
+
+
+Name = Annotated[str, Field(description="what it is called", max_length=200)]
+PlainName = Annotated[
+    str,
+    Field(description="what it is called, and its result file by default", min_length=1, max_length=200),
+    AfterValidator(_check_plain),
+]
+"""A name from which that of a file is made; it leads to no other folder."""
+Source = Annotated[str, Field(description="where its numbers come from")]
 
 
 class Params(BaseModel):
     """Frozen, validated parameters; unknown keys are refused."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, arbitrary_types_allowed=True, allow_inf_nan=False
+    )
 
 
 def build(model: type[M], table: Mapping[str, Any], where: str = "") -> M:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tiengine.file_lock import settle
 from tiengine.input_files import parse_toml
 from tiengine.journal import journal_of
-from tiengine.presets import nearest
+from tiengine.presets import is_file, nearest
 from tiengine.quantity import InputError
 from tiengine.result_layout import check_train, readable, unreadable
 
@@ -37,6 +37,7 @@ COMPLETE = "complete"
 RUNNING = "running"
 """Status of one that is on its way, or was when the program ended."""
 TRAIN = re.compile(r"trains/\d+(?=/|$)", flags=re.ASCII)
+CHECKSUM = "scenario_crc32"
 LARGEST_SCENARIO = 100_000_000  # characters
 OPTIONAL = {
     "seats": "output.envelopes = true",
@@ -108,7 +109,19 @@ class Result:
     @property
     def trains(self) -> int:
         """Number of trains."""
-        return len(self["trains"])
+        return len(self._names)
+
+    @property
+    def _names(self) -> list[str]:
+        """Names of the trains."""
+        with readable(self.name):
+            found = self["trains"]
+            if not isinstance(found, h5py.Group):
+                raise InputError(f"{self.name}: trains: damaged: must be a group")
+            names = list(found)
+            if odd := [name for name in names if not TRAIN.fullmatch(f"trains/{name}")]:
+                raise InputError(f"{self.name}: trains/{odd[0]}: damaged: must be the number of a train")
+            return names
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -125,7 +138,8 @@ class Result:
         """
         with readable(self.name):
             text = str(self._file.attrs["scenario"])
-            checksum = self._file.attrs.get("scenario_crc32")
+            has_checksum = CHECKSUM in set(self._file.attrs)  # "get" would take a damaged one for none
+            checksum = self._file.attrs[CHECKSUM] if has_checksum else None
         if len(text) > LARGEST_SCENARIO:
             raise InputError(
                 f"{self.name}: scenario: {len(text) / 1e6:g} MB, larger than {LARGEST_SCENARIO / 1e6:g} MB"
@@ -140,6 +154,16 @@ class Result:
         from tiengine.scenario import load_scenario  # Taichi comes with it: not for those who only read
 
         return load_scenario(parse_toml(self.scenario_toml, f"{self.name}: scenario"))
+
+    def check(self) -> None:
+        """Look at every train, as nothing else does before it is asked for.
+
+        Raises:
+            InputError: One is damaged.
+        """
+        with readable(self.name):
+            for train in self._names:
+                self._at(f"trains/{train}")
 
     def status(self, train: int = 0) -> str:
         """``"complete"``, or why the train failed.
@@ -274,7 +298,7 @@ def open(path: Path | str) -> Result:
     Raises:
         InputError: There is no such file, it is not a result of this program, or its format is another one.
     """
-    if not Path(path).is_file():
+    if not is_file(Path(path)):
         raise InputError(f"{path}: no such file")
     settle(Path(path))
     try:
@@ -315,5 +339,7 @@ def _array(dataset: Any) -> NDArray[Any]:
 
 
 def _plain(value: Any) -> Any:
-    """An attribute as a Python value."""
+    """An attribute as a Python value; bytes that are no text become question marks."""
+    if isinstance(value, str):
+        return value.encode("utf-8", "replace").decode()
     return value.tolist() if isinstance(value, np.generic | np.ndarray) else value

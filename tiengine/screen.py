@@ -33,7 +33,15 @@ SUMMARY = {
 
 def summary(attributes: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Size, step, speed and wall times of a run, from the root attributes of its result."""
-    return [(words, form.format(attributes[key])) for key, (words, form) in SUMMARY.items() if key in attributes]
+    return [(words, _formatted(form, attributes[key])) for key, (words, form) in SUMMARY.items() if key in attributes]
+
+
+def _formatted(form: str, value: Any) -> str:
+    """A number as its form has it; what is none, as of a file that somebody changed, as it is."""
+    try:
+        return form.format(value)
+    except (ValueError, TypeError):
+        return str(value)
 
 
 def print_rows(rows: Sequence[tuple[str, str]]) -> None:

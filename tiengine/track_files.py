@@ -21,7 +21,9 @@ cross level change sign. Its chainage always rises; it is zero at the mileage ``
 from __future__ import annotations
 
 import csv
+import math
 import re
+from array import array
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -30,8 +32,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
+from tiengine.input_files import LARGEST_TRACK, numbers_of, read_text_file
 from tiengine.presets import nearest
-from tiengine.profile_files import read_text_file
 from tiengine.quantity import InputError
 
 __all__ = ["LEVEL_BASE", "band_passed", "read_series"]
@@ -40,9 +42,10 @@ Reals = NDArray[np.float64]
 
 LEVEL_BASE = 1.5
 """Distance over which a cross level is a height [m]: 2 b_i."""
-LARGEST_FILE = 200_000_000  # bytes: some 400 km at 0.25 m
 LARGEST_GAP = 3.0  # times the median step
 LARGEST_DEVIATION = 0.5  # m: gauge beyond is the gauge itself, not its deviation
+LARGEST_CHAINAGE = 1e7  # m
+LARGEST_HEIGHT = 1e4  # m or rad, absolute levels included, of which a band-pass leaves little
 FILTER_ORDER = 4
 
 _ALONG = ("x", "distance", "chainage", "mileage")
@@ -92,27 +95,37 @@ def read_series(
     Raises:
         InputError: The file breaks a rule; the message names file, line and rule.
     """
-    text = read_text_file(path, f"irregularity.file = {str(path)!r}", LARGEST_FILE)
+    text = read_text_file(path, f"irregularity.file = {str(path)!r}", LARGEST_TRACK)
     lines = [
-        (number, [cell.strip() for cell in next(csv.reader([line]))])
+        (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not lines:
         raise InputError(f"{path}, line 1: must name the columns x, z_v, y_a, theta, gauge or others")
-    names, units = _header(path, *lines[0], unit)
+    names, units = _header(path, lines[0][0], _cells(lines[0][1]), unit)
     if len(lines) < 5:
         raise InputError(f"{path}, line {lines[-1][0]}: {len(lines) - 1} points; a spline needs at least 4")
-    rows = np.array([_row(path, number, cells, names) for number, cells in lines[1:]]) * units
+    values = array("d")
+    for number, line in lines[1:]:
+        values.extend(_row(path, number, _cells(line), names))
+    rows = np.frombuffer(values).reshape(-1, len(names)) * units
     columns = dict(zip(names, rows.T, strict=True))
     numbers = [number for number, _ in lines[1:]]
     _check_distance(path, columns["x"], numbers)
     _check_gauge(path, columns.get("gauge"), numbers)
+    _check_size(path, names, rows, numbers)
     for name in names:
         if vertical_up and name in ("z_v", "vertical_left", "vertical_right"):
             columns[name] = -columns[name]
     channels = [_channel(columns, ways, path, lines[0][0]) for ways in _WAYS]
     return _along_the_run(np.stack([columns["x"], *channels], axis=1), start, reverse)
+
+
+def _cells(line: str) -> list[str]:
+    """The texts between the commas of a line."""
+    cells = next(csv.reader([line])) if '"' in line else line.split(",")
+    return [cell.strip() for cell in cells]
 
 
 def _header(path: str | Path, number: int, cells: list[str], unit: str) -> tuple[list[str], Reals]:
@@ -140,15 +153,10 @@ def _row(path: str | Path, number: int, cells: list[str], names: list[str]) -> l
     """The numbers of a line, checked."""
     if len(cells) != len(names):
         raise InputError(f"{path}, line {number}: {len(cells)} values; the header names {len(names)} columns")
-    values = []
-    for name, cell in zip(names, cells, strict=True):
-        try:
-            value = float(cell)
-        except ValueError:
-            value = np.nan
-        if not np.isfinite(value):
-            raise InputError(f"{path}, line {number}: {name} = {cell!r}: must be a finite number")
-        values.append(value)
+    values = numbers_of(cells)
+    if values is None or not all(map(math.isfinite, values)):
+        bad = [not (value := numbers_of([cell])) or not math.isfinite(value[0]) for cell in cells].index(True)
+        raise InputError(f"{path}, line {number}: {names[bad]} = {cells[bad]!r}: must be a finite number")
     return values
 
 
@@ -175,6 +183,16 @@ def _check_gauge(path: str | Path, gauge: Reals | None, numbers: Sequence[int]) 
     if gauge is not None and large.size:
         line = f"{path}, line {numbers[large[0]]}"
         raise InputError(f"{line}: gauge = {gauge[large[0]]:g} m: must be the deviation from the nominal gauge")
+
+
+def _check_size(path: str | Path, names: Sequence[str], rows: Reals, numbers: Sequence[int]) -> None:
+    """Refuse what no track is: its numbers would run away."""
+    most = np.array([LARGEST_CHAINAGE if name == "x" else LARGEST_HEIGHT for name in names])
+    large = np.argwhere(np.abs(rows) > most)
+    if large.size:
+        i, j = large[0]
+        line = f"{path}, line {numbers[i]}: {names[j]} = {rows[i, j]:g}"
+        raise InputError(f"{line}: must be at most {most[j]:g} in magnitude: are its units right?")
 
 
 def _channel(columns: dict[str, Reals], ways: Sequence[str], path: str | Path, number: int) -> Reals:

@@ -36,8 +36,9 @@ from tiengine.column import Column
 from tiengine.event_table import EVENTS, create_events, event_columns
 from tiengine.events import Event
 from tiengine.groups import CHUNK, Axis, Block, GroupSpec, TrainLabels
-from tiengine.output_file import OutputFile, header
+from tiengine.output_file import DISK_ERRORS, OutputFile, header
 from tiengine.quantity import InputError
+from tiengine.result_layout import unreadable
 from tiengine.results import Result
 
 __all__ = ["DTYPES", "Block", "GroupSpec", "TrainLabels", "Writer"]
@@ -129,8 +130,12 @@ class Writer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leave the file as it is, or remove an empty one, unless it was closed."""
+        """Leave the file as it is, or remove an empty one, unless it was closed; say what HDF5 could not read."""
         self.leave()
+        if isinstance(error, OSError) and error.errno in DISK_ERRORS:
+            raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
+        if (words := unreadable(error, trace)) is not None:
+            raise InputError(f"{self._path}: {words}") from error
 
     def add(self, train: int, labels: TrainLabels | None, attributes: Mapping[str, Any] | None = None) -> None:
         """Add a train to the file, or begin one anew that is in it.

@@ -1,0 +1,88 @@
+"""What a result file holds, bit by bit, and what lies beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+__all__ = ["Contents", "contents", "differing", "holds", "litter", "start_of"]
+
+VOLATILE = ("wall_time", "real_time_factor", "peak_memory", "workers", "platform")
+"""Attributes, by their beginning, that tell how a result was computed and not what."""
+
+Contents = dict[str, tuple[tuple[int, ...], bytes]]
+"""Shape and bytes of every dataset and attribute, by path."""
+
+
+def contents(path: Path) -> Contents:
+    """All of a file but what tells how it was computed.
+
+    Args:
+        path: The file.
+
+    Raises:
+        OSError: It does not open.
+    """
+    found: Contents = {}
+
+    def visit(name: str, node: Any) -> None:
+        if isinstance(node, h5py.Dataset):
+            found[name] = (node.shape, _bytes(node[()]))
+        for key, value in node.attrs.items():
+            if not key.startswith(VOLATILE) and key not in ("DIMENSION_LIST", "REFERENCE_LIST"):
+                found[f"{name}@{key}"] = (np.shape(value), _bytes(value))
+
+    with h5py.File(path, "r") as file:
+        visit("", file)
+        file.visititems(visit)
+    return found
+
+
+def differing(a: Contents, b: Contents) -> list[str]:
+    """Paths of what is not the same, bit by bit."""
+    return sorted(name for name in {*a, *b} if a.get(name) != b.get(name))
+
+
+def start_of(part: Contents, whole: Contents) -> list[str]:
+    """Datasets of an unfinished file that are not the beginning of those of the whole one."""
+    bad = []
+    for name, (shape, data) in part.items():
+        if "@" in name:
+            continue
+        whole_shape, whole_data = whole.get(name, ((), b""))
+        if shape[1:] != whole_shape[1:] or not whole_data.startswith(data):
+            bad.append(name)
+    return bad
+
+
+def holds(part: Contents, rows: Mapping[str, Mapping[str, int]]) -> bool:
+    """Whether a file holds at least so many rows.
+
+    Args:
+        part: The file.
+        rows: By train and group, as a run has noted them with its last commit.
+    """
+    for train, groups in rows.items():
+        for group, count in groups.items():
+            grown = [shape[0] for name, (shape, _) in part.items() if _grows(name, f"trains/{int(train):03d}/{group}")]
+            if max(grown, default=0) < count:
+                return False
+    return True
+
+
+def litter(path: Path) -> list[str]:
+    """Files beside a finished result that belong to it."""
+    return sorted(each.name for each in path.parent.iterdir() if path.name in each.name and each != path)
+
+
+def _grows(name: str, group: str) -> bool:
+    return name.startswith(f"{group}/") and "@" not in name and "/" not in name[len(group) + 1 :]
+
+
+def _bytes(value: Any) -> bytes:
+    array = np.asarray(value)
+    return b"".join(f"{each!r}\n".encode() for each in array.ravel()) if array.dtype.kind in "OUS" else array.tobytes()

@@ -1,0 +1,307 @@
+"""kill -9 at random instants: what is left, and whether it can be gone on with to the same bits."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from tiengine import results
+from tiengine.journal import journal_of
+from tiengine.quantity import InputError
+from validation.faults.contents import Contents, contents, differing, holds, litter, start_of
+from validation.faults.launch import Process, command, copied, keep_shapes
+from validation.faults.plan import Kill, Run
+from validation.faults.record import Record, read
+
+__all__ = ["Outcome", "Yard"]
+
+NAME = "run.h5"
+PATIENCE = 15.0  # s for workers of a dead parent to leave: they notice at the end of their chunk
+TRIES = 4  # of a kill that came too late
+
+Launch = Callable[[Path, str, Sequence[str]], Process]
+LAUNCH: dict[str, Launch] = {"copy": copied, "command": command}
+
+
+@dataclass
+class Outcome:
+    """What became of a killed run.
+
+    Attributes:
+        kill: What was done to it.
+        at: Instant, after its start [s].
+        phase: What it was at: "before", "set-up", "loop", "commit" (its journal lay there).
+        opens: Whether plain h5py opened the file as it was left.
+        mended: Whether it did not, and did with the journal.
+        kept: Whether all that was committed is there, bit by bit.
+        lost_samples, lost_bytes: Written since the last commit, of wheels and in all.
+        resumed: How often it was gone on with.
+        status: Last exit status.
+        same: Whether it has the bits of the undisturbed run in the end.
+        wrong: What is not as it should be.
+    """
+
+    kill: Kill
+    at: float = 0.0
+    phase: str = "before"
+    opens: bool = True
+    mended: bool = False
+    kept: bool = True
+    lost_samples: int = 0
+    lost_bytes: int = 0
+    resumed: int = 0
+    status: int = 0
+    same: bool = False
+    wrong: list[str] = field(default_factory=list)
+
+    @property
+    def survived(self) -> bool:
+        """Whether nothing is wrong."""
+        return self.same and self.kept and (self.opens or self.mended) and not self.wrong
+
+
+class Yard:
+    """A place where one run is started, disturbed and compared, again and again.
+
+    Attributes:
+        folder: Holds the folders of its runs.
+        run: What is run.
+        reference: What an undisturbed run leaves.
+        instants: When such a run has its file, its first samples, and its end [s], by how it is started.
+    """
+
+    def __init__(self, folder: Path, run: Run) -> None:
+        """Run undisturbed in this process, which compiles."""
+        self.folder, self.run = folder, run
+        self._count = 0
+        self.reference: Contents = self._undisturbed()
+        self.instants: dict[str, tuple[float, float, float]] = {}
+
+    def _undisturbed(self) -> Contents:
+        """In this process: kernels stay compiled."""
+        from tiengine import simulate
+        from tiengine.scenario import load_scenario
+
+        keep_shapes()
+        words = self.run.arguments
+        settings = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
+        path = self.folder / "reference.h5"
+        with simulate.run(load_scenario(self.run.scenario, settings), path, workers=1) as result:
+            assert not result.failures, result.failures
+        return contents(path)
+
+    def place(self) -> Path:
+        """An empty folder."""
+        self._count += 1
+        folder = self.folder / f"{self._count:04d}"
+        folder.mkdir()
+        return folder
+
+    def start(self, folder: Path, how: str = "copy", *extra: str) -> Process:
+        """Start the run."""
+        return LAUNCH[how](folder, "run", [*self.run.arguments, "-o", NAME, *extra])
+
+    def resume(self, folder: Path, how: str = "copy") -> Process:
+        """Start going on with it."""
+        return LAUNCH[how](folder, "resume", ["resume", NAME, *self.run.effort])
+
+    def go_on(self, folder: Path, how: str = "copy") -> Process:
+        """Resume, or begin again where there is no file (yet)."""
+        return self.resume(folder, how) if (folder / NAME).exists() else self.start(folder, how)
+
+    def clear(self, folder: Path) -> None:
+        """Forget a folder and its logs."""
+        shutil.rmtree(folder)
+        for beside in self.folder.glob(f"{folder.name}.*"):
+            beside.unlink()
+
+    def measure(self, how: str) -> tuple[float, float, float]:
+        """Instants of an undisturbed run [s]; it must have the same bits."""
+        if how not in self.instants:
+            folder = self.place()
+            clock = time.perf_counter()
+            process = self.start(folder, how)
+            seen = [self._until(process, sign, folder) - clock for sign in (_exists, _loops)]
+            process.wait()
+            self.instants[how] = (seen[0], seen[1], time.perf_counter() - clock)
+            bad = self.wrong(folder, process)
+            if bad:
+                raise RuntimeError(f"an undisturbed run is not like the other: {bad}; {process.said}")
+            self.clear(folder)
+        return self.instants[how]
+
+    def perform(self, kill: Kill) -> Outcome:
+        """Kill, look, resume, compare."""
+        self.measure(kill.start)
+        for attempt in range(TRIES):
+            folder = self.place()
+            outcome = Outcome(kill)
+            process = self.start(folder, kill.start)
+            if self._kill(process, kill.moment, kill.part * 0.7**attempt, kill, folder, outcome):
+                break
+            self.clear(folder)
+        else:
+            outcome.wrong.append("never alive when it was to be killed")
+            return outcome
+        try:
+            self._after(process, kill, folder, outcome)
+        except Exception as error:
+            outcome.wrong.append(f"{type(error).__name__}: {error}")
+        if outcome.survived:
+            self.clear(folder)
+        return outcome
+
+    def wait_for_file(self, process: Process, folder: Path) -> None:
+        """Until a run has made its file."""
+        self._until(process, _exists, folder)
+
+    def wait_for_samples(self, process: Process, folder: Path) -> None:
+        """Until a run has written samples."""
+        self._until(process, _loops, folder)
+
+    def committed(self, folder: Path, process: Process) -> list[str]:
+        """What is wrong with an unfinished file."""
+        outcome = Outcome(Kill("", "", "", "", 0.0, 0.0))
+        self._look(process, folder, outcome)
+        return outcome.wrong
+
+    def wrong(self, folder: Path, process: Process) -> list[str]:
+        """What is not as an undisturbed run leaves it, after exit status 0."""
+        if process.status == 2 and _said_complete(process):
+            pass  # it was killed on its way out, after its last commit
+        elif process.status != 0:
+            return [f"exit status {process.status}: {process.said[-300:]}"]
+        bad = differing(contents(folder / NAME), self.reference)
+        return [f"other bits: {', '.join(bad[:5])}"] * bool(bad) + [f"left: {name}" for name in litter(folder / NAME)]
+
+    def _after(self, process: Process, kill: Kill, folder: Path, outcome: Outcome) -> None:
+        if kill.victim == "worker":
+            process.wait()
+            if process.status not in (0, 1):
+                outcome.wrong.append(f"exit status {process.status}: {process.said[-300:]}")
+        else:
+            self._look(process, folder, outcome)
+            process = self._go_on(kill.start, folder, outcome)
+            if kill.again:
+                second = Outcome(kill)
+                if self._kill(process, "loop", kill.then, kill, folder, second):
+                    self._look(process, folder, second)
+                    outcome.opens &= second.opens or second.mended
+                    outcome.kept &= second.kept
+                    outcome.wrong += second.wrong
+                    process = self._go_on(kill.start, folder, outcome)
+            process.wait()
+        outcome.status = int(process.status or 0)
+        bad = self.wrong(folder, process)
+        outcome.same = not bad
+        outcome.wrong += bad
+
+    def _go_on(self, how: str, folder: Path, outcome: Outcome) -> Process:
+        outcome.resumed += 1
+        return self.go_on(folder, how)
+
+    def _kill(self, process: Process, moment: str, part: float, kill: Kill, folder: Path, outcome: Outcome) -> bool:
+        """Kill at a moment; whether it was still alive."""
+        clock = time.perf_counter()
+        exists, loops, ends = self.measure(kill.start)
+        if moment == "before":
+            time.sleep(part * exists)
+        elif moment == "life":
+            self._until(process, _exists, folder)
+            time.sleep(part * (ends - exists))
+        else:
+            self._until(process, _loops, folder)
+            time.sleep(part * (ends - loops) * (0.6 if moment == "commit" else 1.0))
+        if moment == "commit":
+            self._until(process, _commits, folder)
+        victims = process.workers()
+        if process.poll() is not None or (kill.victim == "worker" and not victims):
+            process.wait()
+            return False
+        outcome.at = time.perf_counter() - clock
+        if kill.victim == "worker":
+            which = int(np.random.default_rng(int(part * 1e9)).integers(len(victims)))
+            outcome.phase = "loop" if read(process.log).loop else "set-up"
+            victims[which].kill()
+            return True
+        process.signal(signal.SIGKILL)
+        process.wait()
+        left = psutil.wait_procs(victims, PATIENCE)[1]
+        outcome.wrong += [f"worker {each.pid} outlives its parent" for each in left]
+        return process.status == -signal.SIGKILL
+
+    def _until(self, process: Process, sign: Callable[[Process, Path], bool], folder: Path) -> float:
+        """Wait for a sign, or the end; the time."""
+        while process.poll() is None and not sign(process, folder):
+            if sign is not _commits:
+                time.sleep(0.003)
+        return time.perf_counter()
+
+    def _look(self, process: Process, folder: Path, outcome: Outcome) -> None:
+        """What the killed process has left."""
+        path, noted = folder / NAME, read(process.log)
+        if not path.exists():
+            if noted.commits:
+                outcome.kept = False
+                outcome.wrong.append("no file after a commit")
+            return
+        outcome.phase = "commit" if journal_of(path).exists() else "loop" if noted.loop else "set-up"
+        outcome.lost_samples += noted.lost_samples
+        outcome.lost_bytes += noted.lost_bytes
+        try:
+            left = contents(path)
+        except (OSError, KeyError, RuntimeError):
+            outcome.opens = False
+            left = self._mended(path, outcome)
+        if start_of(left, self.reference):
+            outcome.mended = False
+            left = self._mended(path, outcome)
+        if b"complete" in left.get("@status", ((), b""))[1]:
+            outcome.phase = "after the end"
+        outcome.kept = _kept(left, noted, self.reference, outcome)
+
+    def _mended(self, path: Path, outcome: Outcome) -> Contents:
+        """The file once its journal was carried out."""
+        had = journal_of(path).exists()
+        try:
+            results.open(path).close()
+            left = contents(path)
+        except (InputError, OSError) as error:
+            outcome.wrong.append(f"{error}")
+            return {}
+        outcome.mended = had
+        return left
+
+
+def _kept(left: Contents, noted: Record, reference: Contents, outcome: Outcome) -> bool:
+    bad = start_of(left, reference)
+    if bad:
+        outcome.wrong.append(f"other samples: {', '.join(bad[:5])}")
+    enough = holds(left, noted.rows)
+    if not enough:
+        outcome.wrong.append("fewer samples than were committed")
+    return enough and not bad
+
+
+def _said_complete(process: Process) -> bool:
+    """Whether there was nothing to resume any more."""
+    return process.said.strip() == f"error: {NAME}: is complete; there is nothing to resume"
+
+
+def _exists(process: Process, folder: Path) -> bool:
+    return (folder / NAME).exists()
+
+
+def _loops(process: Process, folder: Path) -> bool:
+    return process.log.exists() and '"samples"' in process.log.read_text().rpartition('"samples": 0')[2]
+
+
+def _commits(process: Process, folder: Path) -> bool:
+    return any(each.name.endswith((".part", ".journal")) for each in folder.iterdir())

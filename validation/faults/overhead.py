@@ -1,0 +1,125 @@
+"""What checkpoints and commits cost, as a share of the loop.
+
+Counted: the time of one checkpoint (state, commit, file) every 60 s and of one commit every 5 s (more rarely if it
+took more than 1 % of that), each with what is written in the meantime. Directly: blocks of steps with a commit and a
+checkpoint after each, and without, in turn; the difference, which holds what they do to caches as well, at the rates of
+a real run.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from tiengine.gather import COMMIT_SHARE, FLUSH_SECONDS, Gathering
+from tiengine.march import Run, _facts
+from tiengine.messages import Begun, Saved
+from tiengine.plan import plan
+from tiengine.scenario import load_scenario, to_toml
+from tiengine.simulate import CHECKPOINT_SECONDS, _groups
+from tiengine.writer import Writer
+
+__all__ = ["Overhead", "overhead"]
+
+
+@dataclass(frozen=True)
+class Overhead:
+    """Costs of a run with default outputs.
+
+    Attributes:
+        trains: Advanced together.
+        chunk: Wall time of a thousand steps, with writing [s].
+        commit: Of a commit after as many chunks as 5 s hold [s].
+        checkpoint: Of a checkpoint, commit included [s].
+        counted: Share of the loop.
+        difference: Of a block with a checkpoint to one without [s].
+        direct: Share of the loop.
+    """
+
+    trains: int
+    chunk: float
+    commit: float
+    checkpoint: float
+    counted: float
+    difference: float
+    direct: float
+
+
+def overhead(folder: Path, trains: int, repeats: int) -> Overhead:
+    """Measure.
+
+    Args:
+        folder: For the result.
+        trains: Advanced together.
+        repeats: Of each.
+    """
+    settings = ["train.distance=100000", f"ensemble.size={trains}"]
+    scenario = load_scenario("paper", settings)
+    path = folder / f"overhead{trains}.h5"
+    with threadpool_limits(1), Writer(path, to_toml(scenario), {}, [], _groups(scenario)) as writer:
+        (task,) = plan(scenario)
+        run = Run.begin(task)
+        gathering = Gathering(scenario, writer, path)
+        gathering.take(Begun(0, run.labels, _facts(task, run.model)))
+        measure = _Measure(run, gathering, writer)
+        measure.block(3)
+        plain, with_one = [], []
+        for _ in range(repeats):
+            plain.append(measure.block(1))
+            with_one.append(measure.block(1) + measure.checkpoint())
+        chunk = median(plain)
+        between = max(round(FLUSH_SECONDS / chunk), 1)
+        few = max(repeats // 4, 3)
+        commits = [measure.commit_after(between) for _ in range(few)]
+        checkpoints = [measure.checkpoint_after(between) for _ in range(few)]
+        size = path.stat().st_size
+    path.unlink()
+    for each in folder.glob(f".{path.name}*"):
+        each.unlink()
+    assert size > 0
+    commit, checkpoint = median(commits), median(checkpoints)
+    difference = median(b - a for a, b in zip(plain, with_one, strict=True))
+    per_second = 1.0 / CHECKPOINT_SECONDS
+    often = commit / max(FLUSH_SECONDS, commit / COMMIT_SHARE)
+    counted, direct = (often + each * per_second for each in (checkpoint, difference))
+    return Overhead(trains, chunk, commit, checkpoint, counted, difference, direct)
+
+
+class _Measure:
+    """A run that is advanced a chunk of steps at a time."""
+
+    def __init__(self, run: Run, gathering: Gathering, writer: Writer) -> None:
+        self._run, self._gathering, self._writer = run, gathering, writer
+        self._blocks = run.blocks()
+
+    def block(self, chunks: int) -> float:
+        """Advance and write; no commit."""
+        clock = time.perf_counter()
+        for _ in range(chunks):
+            self._gathering._committed = clock + 1e9  # none of its own
+            self._gathering.take(next(self._blocks))
+        return time.perf_counter() - clock
+
+    def checkpoint(self) -> float:
+        """As a run does every 60 s."""
+        clock = time.perf_counter()
+        saved: Any = self._run.saved(0.0)
+        self._gathering.take(Saved(self._run.task.trains, saved))
+        return time.perf_counter() - clock
+
+    def commit_after(self, chunks: int) -> float:
+        """Of what has been written in some chunks."""
+        self.block(chunks)
+        clock = time.perf_counter()
+        self._writer.commit()
+        return time.perf_counter() - clock
+
+    def checkpoint_after(self, chunks: int) -> float:
+        """Likewise, with a checkpoint."""
+        self.block(chunks)
+        return self.checkpoint()

@@ -1,0 +1,206 @@
+"""The report: a table on the screen, and ``faults.md``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+__all__ = ["page", "rows", "show"]
+
+TARGET = 0.02  # of the loop, for checkpoints
+HEAD = ("part", "what was done", "what came of it", "")
+VERDICTS = {True: "good", False: "BAD", None: "skipped"}
+COLOURS = {True: "green", False: "bold red", None: "yellow"}
+
+Row = tuple[str, str, str, bool | None]
+Found = Mapping[str, Any]
+
+
+def rows(known: Mapping[str, Found]) -> list[Row]:
+    """One row for each thing that was tried.
+
+    Args:
+        known: Findings by part.
+    """
+    found: list[Row] = []
+    for name, part in known.items():
+        if "summary" in part:
+            found += _kills(name, part)
+        if "deaths" in part:
+            found.append(_boundaries(name, part))
+        found += _checks(name, part.get("checks", []))
+        for each in part.get("overhead", []):
+            words = f"{each['trains']} train{'s together' if each['trains'] > 1 else ''}: cost of checkpoints"
+            said = f"{each['counted']:.2%} of the loop counted, {each['direct']:.2%} directly"
+            found.append((name, words, said, max(each["counted"], each["direct"]) < TARGET))
+    return found
+
+
+def show(table_rows: Sequence[Row], console: Console) -> None:
+    """Print the rows."""
+    table = Table(show_lines=True)
+    for name in HEAD:
+        table.add_column(name, overflow="fold")
+    for part, words, said, good in table_rows:
+        table.add_row(*map(escape, (part, words, said)), f"[{COLOURS[good]}]{VERDICTS[good]}[/]")
+    console.print(table)
+
+
+def page(known: Mapping[str, Found]) -> str:
+    """Markdown.
+
+    Args:
+        known: Findings by part, with their circumstances.
+    """
+    found = rows(known)
+    judged = [row for row in found if row[3] is not None]
+    lines = [
+        "# Faults",
+        "",
+        f"{sum(bool(row[3]) for row in judged)} of {len(judged)} good. Written by `python -m validation.faults`;",
+        "`docs/robustness.md` says what is promised.",
+        "",
+        *_circumstances(known),
+    ]
+    for part in known.values():
+        if "summary" in part:
+            lines += ["", f"## kill -9: {part['words']}", "", *_kill_tables(part)]
+    if "deaths" in known.get("boundaries", {}):
+        lines += ["", "## Death between any two system calls", "", *_boundary_words(known["boundaries"])]
+    if "deaths" in known.get("power", {}):
+        lines += ["", "## Power cuts", "", *_power_words(known["power"])]
+    if "overhead" in known.get("overhead", {}):
+        lines += ["", "## What checkpoints cost", "", *_overhead(known["overhead"]["overhead"])]
+    rest = [row for row in found if "checks" in known[row[0]]]
+    lines += ["", "## Everything else", ""]
+    lines += _table(HEAD, [(part, words, said, VERDICTS[good]) for part, words, said, good in rest])
+    return "\n".join(lines) + "\n"
+
+
+def _kills(name: str, part: Found) -> Iterator[Row]:
+    summary = part["summary"]
+    said = (
+        f"{summary['survived']} of {summary['kills']} ended with the bits of an undisturbed run; committed samples"
+        f" lost: in {summary['kills'] - summary['kept']}; at most {summary['lost_bytes_largest'] / 1e6:.2f} MB since"
+        " the last commit"
+    )
+    yield name, f"kill -9 at random instants, {part['words']}", said, summary["survived"] == summary["kills"]
+
+
+DEATHS = {
+    "boundaries": "death at every system call that changes the disk",
+    "power": "power cut at every second of these calls, made up",
+}
+
+
+def _boundaries(name: str, part: Found) -> Row:
+    said = (
+        f"{part['deaths']} deaths: {part['as_before']} times as of the last commit, {part['as_after']} of the one under"
+        f" way; {len(part['wrong'])} times anything else"
+    )
+    return name, DEATHS[name], said, not part["wrong"]
+
+
+def _checks(name: str, checks: Sequence[Found]) -> Iterator[Row]:
+    for each in checks:
+        said = each.get("said", "")
+        if "off" in each:
+            said = f"{each['estimate'] / 1e6:.2f} MB for {each['true'] / 1e6:.2f} MB: {each['off']:+.1%}"
+        if each.get("status") is not None:
+            said = f"exit status {each['status']}; {said}"
+        if "late" in each:
+            said = f"after {each['late'] * 1e3:.1f} ms: {said}"
+        wrong = "; ".join(map(str, each["wrong"]))
+        yield name, each["words"], _one_line(f"{said} **{wrong}**" if wrong else said), each["good"]
+
+
+def _circumstances(known: Mapping[str, Found]) -> list[str]:
+    """Machine and date of each part."""
+    seen = {name: part["circumstances"] for name, part in known.items()}
+    lines = list({_machine(each): None for each in seen.values()})
+    body = [
+        (name, each["date"], each["effort"], each["commit"], f"{each['load_average']:.1f}", f"{part['seconds']:.0f}")
+        for (name, each), part in zip(seen.items(), known.values(), strict=True)
+    ]
+    return [*lines, "", *_table(("part", "begun", "effort", "commit", "load average then", "seconds"), body)]
+
+
+def _machine(seen: Found) -> str:
+    machine = seen["machine"]
+    versions = ", ".join(f"{name} {version}" for name, version in seen["versions"].items())
+    return f"{machine['cpu']}, {machine['cores']} cores, {machine['memory_bytes'] / 2**30:.0f} GiB; {versions}."
+
+
+def _kill_tables(part: Found) -> list[str]:
+    """Counts over how and when; then those that went wrong."""
+    groups: dict[tuple[str, ...], list[Found]] = {}
+    for row in part["kills"]:
+        kill = row["kill"]
+        again = ", and in the resume" if kill["again"] else ""
+        groups.setdefault((kill["victim"], f"{kill['moment']}{again}", kill["start"]), []).append(row)
+    head = ("victim", "when", "started as", "kills", "survived", "killed in", "opened as left", "by the journal",
+            "second kills", "since last commit, largest")  # fmt: skip
+    body = []
+    for key, group in groups.items():
+        phases = sorted({row["phase"] for row in group})
+        counts = ", ".join(f"{phase} {sum(row['phase'] == phase for row in group)}" for phase in phases)
+        numbers = (sum(row[name] for row in group) for name in ("survived", "opens", "mended"))
+        survived, opened, mended = (str(number) for number in numbers)
+        twice = str(sum(row["resumed"] > 1 for row in group))
+        lost = f"{max(row['lost_bytes'] for row in group) / 1e6:.2f} MB"
+        body.append((*key, str(len(group)), survived, counts, opened, mended, twice, lost))
+    lines = _table(head, body)
+    wrong = [f"- {row['kill']}: {'; '.join(row['wrong'])}" for row in part["kills"] if row["wrong"]]
+    return [*lines, "", *(_one_line(each) for each in wrong)]
+
+
+def _boundary_words(part: Found) -> list[str]:
+    sessions = ", ".join(f"{name} {calls}" for name, calls in part["sessions"].items())
+    return [
+        f"System calls of each session: {sessions}. A copy of the process died before each of them, and in the",
+        f"middle of each write: {part['deaths']} times. The file was as of the last commit {part['as_before']} times,",
+        f"as of the one under way {part['as_after']} times; {part['by_journal']} of these only once the journal was",
+        "carried out by whatever opened the file next, which was broken off at every call as well,",
+        f"{part['twice']} times.",
+        f"Anything else: {len(part['wrong'])}.",
+        *(f"- {_one_line(each)}" for each in part["wrong"][:20]),
+    ]
+
+
+def _power_words(part: Found) -> list[str]:
+    return [
+        f"{part['deaths']} disks were made up as a journalling file system may leave them when power fails during the",
+        "same sessions: of each file what was there at its last fsync and any part of what was written since, in any",
+        f"order. The file was as of the last commit {part['as_before']} times, as of the one under way",
+        f"{part['as_after']} times, {part['by_journal']} of these with its journal.",
+        f"Anything else: {len(part['wrong'])}.",
+        *(f"- {_one_line(each)}" for each in part["wrong"][:20]),
+    ]
+
+
+def _overhead(found: Sequence[Found]) -> list[str]:
+    head = (
+        *("trains", "1000 steps", "commit of 5 s of samples", "checkpoint with commit", "share, counted"),
+        *("more in a block with a checkpoint", "share, directly"),
+    )
+    body = [
+        (str(each["trains"]), f"{each['chunk'] * 1e3:.0f} ms", f"{each['commit'] * 1e3:.1f} ms",
+         f"{each['checkpoint'] * 1e3:.1f} ms", f"{each['counted']:.2%}", f"{each['difference'] * 1e3:.1f} ms",
+         f"{each['direct']:.2%}")
+        for each in found
+    ]  # fmt: skip
+    return _table(head, body)
+
+
+def _table(head: Sequence[str], body: Sequence[Sequence[str]]) -> list[str]:
+    cells = [[cell.replace("|", "/") for cell in row] for row in (head, ["---"] * len(head), *body)]
+    return [f"| {' | '.join(row)} |" for row in cells]
+
+
+def _one_line(text: str) -> str:
+    words = " ".join(text.split())
+    return words if len(words) < 500 else f"{words[:250]} ... {words[-240:]}"

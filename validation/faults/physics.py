@@ -1,0 +1,147 @@
+"""Physics that goes wrong in one train of four: caught within a millisecond, named, and no matter to the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tiengine import march, simulate
+from tiengine.events import RunFailedError
+from tiengine.guards import LIMITS
+from tiengine.kernels import layout as at
+from tiengine.quantity import InputError
+from tiengine.scenario import load_scenario
+from validation.faults.contents import Contents, contents
+from validation.faults.plan import SEED
+from validation.faults.space import Check
+
+__all__ = ["physics"]
+
+TRAINS = 4
+WITHIN = 1e-3  # s of simulated time
+BLOCKS = {
+    "vehicles": ("body", "damper"),
+    "vertical": ("rail, vertically",),
+    "lateral": ("rail, laterally",),
+    "slabs": ("slab",),
+}
+"""Parts of the state, and what the sentence must name."""
+
+SETTINGS = ["train.distance=40", f"ensemble.size={TRAINS}", 'output.precision="double"']
+Change = Callable[[Any, int], None]
+
+
+def physics(folder: Path, repeats: int) -> list[Check]:
+    """Not a number, and growth, at random steps in every part of the state.
+
+    Args:
+        folder: For results.
+        repeats: Of each.
+    """
+    rng = np.random.default_rng(SEED)
+    scenario = load_scenario("paper", SETTINGS)
+    path = folder / "undisturbed.h5"
+    with simulate.run(scenario, path, workers=1) as result:
+        steps, dt = int(result.facts(0)["steps"]), float(result.attributes["time_step"])
+    reference, found = contents(path), []
+    for kind in ("not a number", "growth"):
+        for block in BLOCKS:
+            for _ in range(repeats):
+                train, step = int(rng.integers(TRAINS)), int(rng.integers(2, steps - 300))
+                found.append(_disturbed(folder / "run.h5", scenario, reference, kind, block, train, step, dt, rng))
+    return [*found, _unstable(folder / "run.h5")]
+
+
+def _disturbed(
+    path: Path, scenario: Any, reference: Contents, kind: str, block: str, train: int, step: int, dt: float, rng: Any
+) -> Check:
+    """Spoil one train's state from a step on."""
+    crossed: list[float] = []
+    change = _nan(block, train, step, rng) if kind == "not a number" else _growth(block, train, step)
+    with _spoiled(change, block, train, crossed, dt), simulate.run(scenario, path, workers=1, force=True) as result:
+        failures, events = result.failures, result.group("events", train)
+    words = f"{kind} in the {block} of train {train} from step {step}"
+    bad = [] if list(failures) == [train] else [f"failed: {failures}"]
+    late, named = float("nan"), False
+    if not bad:
+        late = float(events["time"][-1]) - crossed[0]
+        bad += [] if -1e-9 <= late <= WITHIN + 1e-9 else [f"caught {late:g} s after it began"]
+        named = any(word in str(events["message"][-1]) for word in BLOCKS[block])
+        if not named and late < 0.5 * dt:  # later, it has spread over the train through the wheels
+            bad.append(f"names another part: {events['message'][-1]}")
+    found = contents(path)
+    bad += [
+        f"other bits: {name}"
+        for name, value in reference.items()
+        if name.startswith("trains/") and not name.startswith(f"trains/{train:03d}") and found.get(name) != value
+    ]
+    said = failures.get(train, "")
+    return {"words": words, "good": not bad, "late": late, "named": named, "said": said, "wrong": bad[:5]}
+
+
+def _nan(block: str, train: int, step: int, rng: Any) -> Change:
+    """One coordinate, its rate or its acceleration is no number at the end of a step."""
+    row = int(rng.choice([at.U, at.V, at.A]))
+
+    def change(state: Any, done: int) -> None:
+        if done == step:
+            part = state.view(row, block)[train]
+            part.reshape(-1)[int(rng.integers(part.size))] = np.nan
+
+    return change
+
+
+def _growth(block: str, train: int, step: int) -> Change:
+    """A part's motion grows by a half in every step, as in an unstable scheme."""
+
+    def change(state: Any, done: int) -> None:
+        if done >= step and np.isfinite(state.motion).all():
+            for row in (at.U, at.V):
+                state.view(row, block)[train] *= 1.5
+
+    return change
+
+
+@contextmanager
+def _spoiled(change: Change, block: str, train: int, crossed: list[float], dt: float) -> Iterator[None]:
+    """Runs whose steps end with a change of the state, before the guard looks; notes when a limit is passed."""
+    begin = march.Run.begin
+
+    def spoiled(*arguments: Any, **options: Any) -> Any:
+        run = begin(*arguments, **options)
+        state, stepper = run.stepper.state, run.stepper
+
+        def spoil() -> None:
+            done = run.done + stepper.asked[0] + 1
+            change(state, done)
+            if not crossed and not all(
+                bool((np.abs(state.view(row, block)[train]) < limit).all()) for row, limit in LIMITS.items()
+            ):
+                crossed.append(done * dt)
+
+        *before, guard = stepper.stages
+        assert guard[0] == "guards", guard[0]
+        stepper.stages = (*before, ("faults", spoil), guard)
+        return run
+
+    march.Run.begin = staticmethod(spoiled)  # type: ignore[method-assign,assignment]
+    try:
+        yield
+    finally:
+        march.Run.begin = begin  # type: ignore[method-assign]
+
+
+def _unstable(path: Path) -> Check:
+    """A step far too long, past the check of the start."""
+    words = "numerics.time_step = 0.001, five times too long"
+    try:
+        simulate.run(
+            load_scenario("paper", ["train.distance=20", "numerics.time_step=0.001"]), path, workers=1, force=True
+        ).close()
+    except (RunFailedError, InputError) as error:
+        return {"words": words, "good": True, "said": str(error), "wrong": []}
+    return {"words": words, "good": False, "said": "", "wrong": ["not noticed"]}

@@ -1,0 +1,85 @@
+"""A run that notes what it writes, so that a killed one can be told from what it had promised.
+
+``python -m validation.faults.record LOG ARGUMENTS...`` is the command ``tiengine ARGUMENTS...`` with a line in LOG for
+every block of samples written, and one for every commit, after it. The lines survive the process.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tiengine import writer
+
+__all__ = ["Record", "read", "recorded"]
+
+REAL = 4  # bytes of a channel's value: output.precision is "single"
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a run has noted.
+
+    Attributes:
+        loop: Whether it had begun to write samples.
+        commits: How often it has committed.
+        rows: Rows of every group of every train with its last commit.
+        lost_samples: Of wheels, written since then.
+        lost_bytes: Of all samples written since then.
+    """
+
+    loop: bool
+    commits: int
+    rows: dict[str, dict[str, int]]
+    lost_samples: int
+    lost_bytes: int
+
+
+def recorded(log: Path) -> None:
+    """Let the writer of this process note what it does.
+
+    Args:
+        log: File to append to.
+    """
+    file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+    written = {"samples": 0, "bytes": 0}
+    write, commit = writer.Writer.write, writer.Writer.commit
+
+    def note(**facts: Any) -> None:
+        os.write(file, f"{json.dumps(facts)}\n".encode())
+
+    def noted_write(self: Any, train: int, blocks: Mapping[str, Any]) -> None:
+        write(self, train, blocks)
+        written["samples"] += len(blocks["wheel"].along) if "wheel" in blocks else 0
+        for block in blocks.values():
+            written["bytes"] += sum(values.size for values in block.channels.values()) * REAL + 16 * len(block.along)
+        note(**written)
+
+    def noted_commit(self: Any) -> None:
+        commit(self)
+        known = sorted({train for train, _ in self._columns})
+        note(rows={str(train): self.rows(train) for train in known}, **written)
+
+    writer.Writer.write, writer.Writer.commit = noted_write, noted_commit  # type: ignore[method-assign]
+
+
+def read(log: Path) -> Record:
+    """What a run has noted until it ended."""
+    lines = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+    commits = [line for line in lines if "rows" in line]
+    last = commits[-1] if commits else {"rows": {}, "samples": 0, "bytes": 0}
+    end = lines[-1] if lines else last
+    lost = end["samples"] - last["samples"], end["bytes"] - last["bytes"]
+    return Record(any(line["samples"] for line in lines), len(commits), last["rows"], *lost)
+
+
+if __name__ == "__main__":
+    from tiengine.cli import main
+
+    recorded(Path(sys.argv[1]))
+    main(sys.argv[2:], prog_name="tiengine")
