@@ -87,7 +87,7 @@ def test_figure_names_its_axes(tmp_path, report, suffix):
         (["LMA", "CHN60", "--gauge", "-1"], "contact.gauge = -1.0: must be greater than 0 m"),
         (["LMA", "CHN60", "--largest", "0.001"], "largest shift = 1 mm: must be 3 to 20 mm"),
         (["LMA", "CHN60", "-o", "figure.abc"], "output = 'figure.abc': its suffix must be one of"),
-        (["LMA", "CHN60", "-o", "no/such/figure.png"], "output = 'no/such/figure.png': cannot be written"),
+        (["LMA", "CHN60", "-o", "no/such/figure.png"], "output = 'no/such/figure.png': there is no folder 'no/such'"),
     ],
 )
 def test_bad_input_is_one_line(tmp_path, monkeypatch, arguments, message):
