@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from tiengine import results
+from tiengine.result_layout import LAYOUT
 from tiengine.results import FORMAT, FORMAT_VERSION, Result
 from tiengine.scenario import Scenario, load_scenario, to_toml
 from tiengine.train import assemble, static_wheel_loads
@@ -57,7 +58,16 @@ def written(path: Path, of: Scenario, *trains: Groups, status: str = "complete",
                         group.attrs.update(values)
                     else:
                         group[key] = list(values) if isinstance(values, tuple) else values
+                _label(group, LAYOUT.get(name, ()))
     return path
+
+
+def _label(group: h5py.Group, dimensions: tuple[str, ...]) -> None:
+    """The labels of a group's dimensions that a test does not care for: numbers."""
+    channels = [dataset for dataset in group.values() if len(dimensions) > 1 and dataset.ndim == len(dimensions)]
+    for axis, name in enumerate(dimensions):
+        if name not in group and channels:
+            group[name] = np.arange(channels[0].shape[axis])
 
 
 def made(path: Path, of: Scenario, *trains: Groups, **more: Any) -> Result:

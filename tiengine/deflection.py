@@ -106,7 +106,9 @@ class Deflection:
         ex, xi = locate(x[there], slab.length, slab.elements_x)
         for side, (ey, cubic) in enumerate(self._under_rails):
             at_points = motion[:, (number[there] % slots)[:, None], self._slab_dofs[ex, ey]]
-            found[:, side, there] = np.einsum("bni,ni->bn", at_points, np.vander(xi, 4) @ cubic)
+            shapes = np.vander(xi, 4) @ cubic
+            # term by term: einsum's last bit depends on where its arguments lie in memory
+            found[:, side, there] = sum(at_points[..., i] * shapes[:, i] for i in range(shapes.shape[1]))
         return found
 
 

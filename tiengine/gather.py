@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections import Counter
@@ -86,13 +87,13 @@ class Gathering:
         loop = 0.0
         for train, known in self._writer.facts().items():
             self._facts[train] = known
-            self._simulated[train] = float(known.get("simulated_time", 0.0))
+            self._simulated[train] = _number(known, "simulated_time", 0.0)
             status = known.get("status", RUNNING)
             if status not in (COMPLETE, RUNNING):
                 self._fail({train: str(status)})
             if status != RUNNING:
                 self.ended.add(train)
-                loop += float(known.get("wall_time_loop", 0.0)) / int(known.get("trains_together", 1))
+                loop += _number(known, "wall_time_loop", 0.0) / max(_number(known, "trains_together", 1.0), 1.0)
         self._costs.append(Costs(0, 0.0, 0.0, loop / max(workers, 1), 0.0))
 
     def take(self, message: Message) -> None:
@@ -241,3 +242,18 @@ class Gathering:
         first, *others = [known for known in self._facts.values() if known] or [{}]
         rows = {key: value for key, value in first.items() if key not in ONLY_OF_TRAINS}
         return {key: value for key, value in rows.items() if all(known.get(key) == value for known in others)}
+
+
+def _number(known: Mapping[str, Any], key: str, default: float) -> float:
+    """A fact of a train in the file that is being continued.
+
+    Raises:
+        InputError: It is no finite number.
+    """
+    try:
+        value = float(known.get(key, default))
+    except (TypeError, ValueError):
+        value = float("nan")
+    if not math.isfinite(value):
+        raise InputError(f"{key} = {str(known.get(key))[:80]}: must be a finite number; the file is damaged")
+    return value

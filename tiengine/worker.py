@@ -59,6 +59,7 @@ def work(pipe: Connection, public: bool, every: float) -> None:
     """
     for number in SIGNALS:  # to the whole group of processes: the parent tells its workers to save and leave
         signal.signal(number, signal.SIG_IGN)
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
     from tiengine.march import march
 
@@ -72,6 +73,14 @@ def work(pipe: Connection, public: bool, every: float) -> None:
                 pipe.send(IDLE)
     except (EOFError, ConnectionError):  # the parent is gone
         return
+
+
+def _leave_with_parent() -> None:
+    """End at once if the parent dies: the pipe would tell only after compiling, or a chunk of steps."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @dataclass(eq=False)

@@ -11,7 +11,6 @@ import click
 from rich.console import Console
 
 from validation.faults.page import page, rows, show
-from validation.faults.plan import RUNS
 from validation.faults.suite import PARTS, perform
 from validation.speed.findings import circumstances
 
@@ -41,8 +40,7 @@ def main(quick: bool, only: tuple[str, ...], jobs: int, draw: bool, output: Path
 
         def keep(name: str, found: dict[str, Any]) -> None:
             facts = {"circumstances": vars(start), "seconds": time.perf_counter() - clock}
-            words = {"words": RUNS[name].words} if name in RUNS else {}
-            known[name] = {**facts, **words, **found}
+            known[name] = {**facts, **found}
             _write(file, known, output)
             console.print(f"{time.perf_counter() - clock:6.0f} s  {PARTS[name].words}")
 

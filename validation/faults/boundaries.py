@@ -27,7 +27,7 @@ from tiengine.groups import Block, GroupSpec, TrainLabels
 from tiengine.journal import journal_of
 from tiengine.quantity import InputError
 from tiengine.writer import Writer
-from validation.faults.contents import contents, litter
+from validation.faults.contents import contents, litter, reads
 from validation.faults.dying import DIED, Call, at_call, in_copy
 
 __all__ = ["NAME", "SESSIONS", "Boundaries", "boundaries", "check_left", "memory_folder", "new_folder", "states_of"]
@@ -224,12 +224,13 @@ def check_left(
         journals: Those whose carrying-out was broken off before; None breaks off none.
     """
     path = folder / NAME
-    left = _state(folder)
-    if left not in allowed:
-        if not journal_of(path).exists():
+    if not journal_of(path).exists():
+        left = _state(folder)
+        if left not in allowed:
             found.wrong.append(f"{where}: neither before nor after the commit")
             return
-        found.by_journal += 1
+    else:
+        found.by_journal += not reads(path, lambda contents: contents in allowed)
         journal = journal_of(path).read_bytes()
         if journals is not None and journal not in journals:
             journals.add(journal)

@@ -9,11 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import h5py
-
 from tiengine import results
 from tiengine.quantity import InputError
-from validation.faults.contents import contents, start_of
+from validation.faults.contents import contents, reads, start_of
 from validation.faults.kills import NAME, Yard
 from validation.faults.launch import Process
 from validation.faults.space import Check
@@ -107,24 +105,18 @@ def _read_meanwhile(yard: Yard) -> Check:
     folder, bad = yard.place(), []
     process = yard.start(folder)
     yard.wait_for_file(process, folder)
-    reads = {"h5py": 0, "tiengine": 0}
-    missed = 0
+    plain = [0, 0]
+    opened = 0
     while process.poll() is None:
-        try:
-            with h5py.File(folder / NAME, "r") as file:
-                file.visit(lambda name: None)
-            found = contents(folder / NAME)
-            reads["h5py"] += 1
-            bad += [f"read other samples: {name}" for name in start_of(found, yard.reference)]
-        except (OSError, KeyError, RuntimeError):
-            missed += 1
+        plain[reads(folder / NAME, lambda left: not start_of(left, yard.reference))] += 1
         try:
             with results.open(folder / NAME) as result:
                 result.finished  # noqa: B018
-            reads["tiengine"] += 1
+            opened += 1
         except InputError as error:
             bad.append(f"tiengine.open: {error}")
-    words = f"read {reads['h5py']} times by h5py ({missed} times in the middle of a commit), {reads['tiengine']} times"
+    missed, read = plain
+    words = f"read {read} times by h5py ({missed} times it came in the middle of a commit), {opened} times"
     words += " by tiengine.open while it is written"
     return _ended(words, bad + yard.wrong(folder, process))
 

@@ -15,7 +15,7 @@ import psutil
 from tiengine import results
 from tiengine.journal import journal_of
 from tiengine.quantity import InputError
-from validation.faults.contents import Contents, contents, differing, holds, litter, start_of
+from validation.faults.contents import Contents, contents, differing, holds, litter, reads, start_of
 from validation.faults.launch import Process, command, copied, keep_shapes
 from validation.faults.plan import Kill, Run
 from validation.faults.record import Record, read
@@ -255,14 +255,8 @@ class Yard:
         outcome.phase = "commit" if journal_of(path).exists() else "loop" if noted.loop else "set-up"
         outcome.lost_samples += noted.lost_samples
         outcome.lost_bytes += noted.lost_bytes
-        try:
-            left = contents(path)
-        except (OSError, KeyError, RuntimeError):
-            outcome.opens = False
-            left = self._mended(path, outcome)
-        if start_of(left, self.reference):
-            outcome.mended = False
-            left = self._mended(path, outcome)
+        outcome.opens = reads(path, lambda left: not start_of(left, self.reference))
+        left = contents(path) if outcome.opens else self._mended(path, outcome)
         if b"complete" in left.get("@status", ((), b""))[1]:
             outcome.phase = "after the end"
         outcome.kept = _kept(left, noted, self.reference, outcome)

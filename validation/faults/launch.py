@@ -191,13 +191,17 @@ class _Copies:
     def Pipe(self) -> Any:
         return self._fork.Pipe()
 
+    def parent_process(self) -> Any:
+        return multiprocessing.parent_process()
+
     def Process(self, target: Callable[..., None], args: tuple[Any, ...], **options: Any) -> Any:
         return self._fork.Process(target=_alone, args=(target, args), **options)
 
 
 def _alone(target: Callable[..., None], args: tuple[Any, ...]) -> None:
     """Close what a spawned process would not have: locks and pipes of others above all."""
-    kept = {0, 1, 2, args[0].fileno()}
+    parent = multiprocessing.parent_process()
+    kept = {0, 1, 2, args[0].fileno(), getattr(parent, "sentinel", None)}
     for number in [int(name) for name in os.listdir("/proc/self/fd")]:
         if number not in kept:
             with suppress(OSError):

@@ -61,13 +61,13 @@ def disk_full(yard: Yard, left: int) -> Check:
         ballast = folder / "ballast"
         _fill(ballast, left)
         status = process.wait()
-        bad = _stopped_clearly(process)
+        bad, said = _stopped_clearly(process), process.said.strip()
         before = yard.committed(folder, process)
         ballast.unlink()
         resumed = yard.go_on(folder)
         resumed.wait()
         bad += before + yard.wrong(folder, resumed)
-    return {"words": words, "good": not bad, "status": status, "said": process.said.strip(), "wrong": bad}
+    return {"words": words, "good": not bad, "status": status, "said": said, "wrong": bad}
 
 
 def refused_at_the_start(yard: Yard) -> Check:

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,6 +16,7 @@ from typing import Any
 __all__ = ["PARTS", "perform"]
 
 Found = dict[str, Any]
+STARTS = {"copy": "copies of a process that has compiled", "command": "the command itself"}
 
 
 @dataclass(frozen=True)
@@ -32,18 +34,19 @@ class Part:
     alone: bool = False
 
 
-def _kills(run: str, folder: Path, share: float) -> Found:
-    """Random kills of a run."""
+def _kills(run: str, start: str, folder: Path, share: float) -> Found:
+    """Random kills of a run that is started in one way."""
     from validation.faults.kills import Yard
     from validation.faults.plan import RUNS, kills
 
     yard = Yard(folder, RUNS[run])
     outcomes = []
-    for kill in kills(run, share):
+    for kill in [each for each in kills(run, share) if each.start == start]:
         outcomes.append(yard.perform(kill))
-        _tell(f"{run}: {len(outcomes)} kills, {sum(each.survived for each in outcomes)} survived")
+        _tell(f"{run}, {start}: {len(outcomes)} kills, {sum(each.survived for each in outcomes)} survived")
     rows = [asdict(each) | {"survived": each.survived} for each in outcomes]
-    return {"kills": rows, "summary": _summary(rows), "instants": yard.instants}
+    words = f"{yard.run.words}, {STARTS[start]}"
+    return {"words": words, "kills": rows, "summary": _summary(rows), "instants": yard.instants}
 
 
 def _summary(rows: Sequence[Found]) -> Found:
@@ -62,14 +65,6 @@ def _summary(rows: Sequence[Found]) -> Found:
         "lost_bytes_mean": sum(lost) / max(len(lost), 1),
         "lost_samples_largest": max(samples, default=0),
     }
-
-
-def _one(folder: Path, share: float) -> Found:
-    return _kills("one", folder, share)
-
-
-def _batch(folder: Path, share: float) -> Found:
-    return _kills("batch", folder, share)
 
 
 def _boundaries(folder: Path, share: float) -> Found:
@@ -135,8 +130,10 @@ def _overhead(folder: Path, share: float) -> Found:
 
 
 PARTS = {
-    "one": Part("kill -9, one train", _one),
-    "batch": Part("kill -9, batch", _batch),
+    "one": Part("kill -9, one train", partial(_kills, "one", "copy")),
+    "one_command": Part("kill -9, one train, the command itself", partial(_kills, "one", "command")),
+    "batch": Part("kill -9, batch", partial(_kills, "batch", "copy")),
+    "batch_command": Part("kill -9, batch, the command itself", partial(_kills, "batch", "command")),
     "boundaries": Part("death between any two system calls", _boundaries),
     "power": Part("power cuts, made up", _power),
     "disk": Part("disk full, read-only", _disk),
