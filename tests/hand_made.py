@@ -58,7 +58,8 @@ def written(path: Path, of: Scenario, *trains: Groups, status: str = "complete",
                         group.attrs.update(values)
                     else:
                         group[key] = list(values) if isinstance(values, tuple) else values
-                _label(group, LAYOUT.get(name, ()))
+                of_gauge = ("time", "direction") if "displacement" in datasets else ("time",)
+                _label(group, LAYOUT.get(name, of_gauge))
     return path
 
 
