@@ -58,8 +58,7 @@ def written(path: Path, of: Scenario, *trains: Groups, status: str = "complete",
                         group.attrs.update(values)
                     else:
                         group[key] = list(values) if isinstance(values, tuple) else values
-                of_gauge = ("time", "direction") if "displacement" in datasets else ("time",)
-                _label(group, LAYOUT.get(name, of_gauge))
+                _label(group, LAYOUT.get(name, ()))
     return path
 
 

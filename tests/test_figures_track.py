@@ -154,7 +154,7 @@ def test_gauges_are_those_of_the_file(tmp_path):
     """Displacement in mm, forces in kN; the four wheels of a train that passes 60 m are marked."""
     times = by.clock(1000, 1e-3)
     shape = np.random.default_rng(3).standard_normal((1000, 2))
-    motion = {"displacement": 1e-3 * shape, "velocity": shape, "acceleration": shape}
+    motion = {"displacement": 1e-3 * shape, "velocity": shape, "acceleration": shape, "direction": np.arange(2)}
     where = {"on": "rail", "chainage": 60.0, "side": "left"}
     force = {"vertical_force": 1e3 * shape[:, 1], "lateral_force": 1e3 * shape[:, 0]}
     path = by.written(tmp_path / "a.h5", by.scenario(), {"wheel": by.wheel(QUIET, QUIET)})
