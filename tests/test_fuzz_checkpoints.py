@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from tiengine.checkpoint import Checkpoint, checkpoint_path
+from tiengine.checkpoint import Checkpoint, checkpoint_path, sealed
 from tiengine.quantity import InputError
 
 from .fuzzing import DAMAGES, EXAMPLES, ODD, Damage, mutated_texts, on_many, refused
@@ -82,8 +82,9 @@ def test_forged_facts(examples: int, tmp_path: Path) -> None:
     )
 
     def check(text: str) -> bool:
-        with path.open("wb") as file:
-            np.savez(file, facts=np.frombuffer(text.encode(errors="surrogatepass"), np.uint8), **ARRAYS)
+        archived = io.BytesIO()
+        np.savez(archived, facts=np.frombuffer(text.encode(errors="surrogatepass"), np.uint8), **ARRAYS)
+        path.write_bytes(sealed(archived.getvalue()))
         found: list[Checkpoint] = []
 
         def read() -> None:
@@ -125,8 +126,10 @@ def npy(shape: str, dtype: str = "'<f8'", order: str = "False") -> bytes:
 def test_forged_arrays(header: bytes, why: str, tmp_path: Path) -> None:
     """What the header of an array claims is believed only as far as the file has bytes for it."""
     path = tmp_path / ".run.h5.0000.checkpoint"
-    with zipfile.ZipFile(path, "w") as archive:
+    forged = io.BytesIO()
+    with zipfile.ZipFile(forged, "w") as archive:
         archive.writestr("state.motion.npy", header)
+    path.write_bytes(sealed(forged.getvalue()))
     message = refused(lambda: Checkpoint.read(path))
     assert message is not None, why
     assert "not a checkpoint, or damaged" in message
@@ -135,8 +138,10 @@ def test_forged_arrays(header: bytes, why: str, tmp_path: Path) -> None:
 def test_archive_bombs(tmp_path: Path) -> None:
     """Compressed members are not unpacked; what the archive's directory claims is compared with the file's size."""
     path = tmp_path / ".run.h5.0000.checkpoint"
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    bomb = io.BytesIO()
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("facts.npy", npy("(200000000,)") + bytes(200_000_000))
+    path.write_bytes(sealed(bomb.getvalue()))
     assert path.stat().st_size < 1_000_000
     message = refused(lambda: Checkpoint.read(path))
     assert message is not None
@@ -145,7 +150,7 @@ def test_archive_bombs(tmp_path: Path) -> None:
     with zipfile.ZipFile(plain, "w") as archive:
         archive.writestr("facts.npy", npy("(8,)"))
     size = len(npy("(8,)")).to_bytes(4, "little")
-    path.write_bytes(plain.getvalue().replace(size, (2**31 - 1).to_bytes(4, "little")))
+    path.write_bytes(sealed(plain.getvalue().replace(size, (2**31 - 1).to_bytes(4, "little"))))
     message = refused(lambda: Checkpoint.read(path))
     assert message is not None
     assert "claims to hold more" in message

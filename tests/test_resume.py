@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from itertools import count
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from tiengine import results, simulate
-from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
+from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths, sealed
 from tiengine.events import RunStoppedError
 from tiengine.quantity import InputError
 from tiengine.scenario import Scenario, load_scenario
@@ -165,8 +166,9 @@ def test_a_checkpoint_of_something_else_is_refused(tmp_path: Path):
 def write_facts(result: Path, facts: dict[str, Any], good: Checkpoint) -> None:
     """A checkpoint with other facts."""
     text = np.frombuffer(json.dumps(facts).encode(), np.uint8)
-    with checkpoint_path(result, 0).open("wb") as file:
-        np.savez(file, facts=text, **good.arrays)
+    archived = io.BytesIO()
+    np.savez(archived, facts=text, **good.arrays)
+    checkpoint_path(result, 0).write_bytes(sealed(archived.getvalue()))
 
 
 def test_a_checkpoint_keeps_every_bit(tmp_path: Path):

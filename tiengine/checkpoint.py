@@ -1,12 +1,13 @@
 """What a run needs to go on with the same bits: the state of the trains of one task between two chunks of steps.
 
-A checkpoint is a small file beside the result, one a task, put in place by an atomic rename: an npz archive of plain
-arrays and one text of facts (JSON). Nothing in it is ever executed. The track needs no place in it: irregularity is a
-function of seed and chainage.
+A checkpoint is a small file beside the result, one a task, put in place by an atomic rename: a SHA-256 digest, then an
+npz archive of plain arrays and one text of facts (JSON). Nothing in it is ever executed. The track needs no place in
+it: irregularity is a function of seed and chainage.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import math
@@ -24,7 +25,10 @@ from tiengine.input_files import LARGEST_CHECKPOINT, check_regular
 from tiengine.journal import atomic_write
 from tiengine.quantity import InputError
 
-__all__ = ["Checkpoint", "checkpoint_path", "checkpoint_paths"]
+__all__ = ["Checkpoint", "checkpoint_path", "checkpoint_paths", "sealed"]
+
+MAGIC = b"tiengine checkpoint\n"
+DIGEST = hashlib.sha256().digest_size
 
 VERSION = 1
 FACTS = "facts"
@@ -85,7 +89,7 @@ class Checkpoint:
         content = io.BytesIO()
         facts = np.frombuffer(text.encode(), dtype=np.uint8)
         np.savez(content, allow_pickle=False, **{FACTS: facts, **self.arrays})
-        atomic_write(checkpoint_path(result, self.task), content.getvalue())
+        atomic_write(checkpoint_path(result, self.task), sealed(content.getvalue()))
 
     @classmethod
     def read(cls, path: Path) -> Checkpoint:
@@ -100,11 +104,12 @@ class Checkpoint:
         where = str(path)
         check_regular(path, where, LARGEST_CHECKPOINT)
         try:
-            with zipfile.ZipFile(path) as archive:
+            archived = _unsealed(path.read_bytes())
+            with zipfile.ZipFile(io.BytesIO(archived)) as archive:
                 members = archive.infolist()
                 if any(member.compress_type != zipfile.ZIP_STORED for member in members):
                     raise ValueError("compressed")
-                if sum(member.file_size for member in members) > path.stat().st_size:
+                if sum(member.file_size for member in members) > len(archived):
                     raise ValueError("claims to hold more than it has bytes")
                 arrays = {member.filename.removesuffix(".npy"): _array(archive, member) for member in members}
             facts = json.loads(arrays.pop(FACTS).tobytes())
@@ -144,6 +149,29 @@ class Checkpoint:
         """Packages of other versions than those that made it: the bits may differ."""
         made_by = self.facts.get("made_by", {})
         return [f"{name} {made_by.get(name)}" for name in MAKERS if made_by.get(name) != metadata.version(name)]
+
+
+def sealed(archived: bytes) -> bytes:
+    """An archive with its digest before it: a zip file's own checksums do not cover its directory.
+
+    Args:
+        archived: The npz archive.
+    """
+    return MAGIC + hashlib.sha256(archived).digest() + archived
+
+
+def _unsealed(content: bytes) -> bytes:
+    """The archive.
+
+    Raises:
+        ValueError: It is not what was sealed.
+    """
+    start = len(MAGIC) + DIGEST
+    if not content.startswith(MAGIC):
+        raise ValueError("does not begin as one")
+    if hashlib.sha256(content[start:]).digest() != content[len(MAGIC) : start]:
+        raise ValueError("digest")
+    return content[start:]
 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
