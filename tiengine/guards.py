@@ -95,7 +95,7 @@ class Guard:
         self._done, self._position = 0, np.zeros(0)
         self._flying = True  # as far as is known: a checkpoint may have brought wheels in flight
         self.every = max(int(EVERY / self.model.given.newmark.dt + 1e-9), 1)
-        self._motion = self.state.motion[at.U : at.A + 1].reshape(-1)
+        self._rows = [(self.state.motion[row], limit * limit) for row, limit in LIMITS.items()]
         self._shift, self._normal = self.state.contact[..., SHIFT], self.state.force[..., 0]
         table = self.model.given.contact
         self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
@@ -126,8 +126,7 @@ class Guard:
             position: Chainage of the first vehicle's centre [m].
         """
         time = step * self.model.given.newmark.dt
-        # accelerations are by far the largest, and run away first; not a number is not less, either
-        if not float(np.dot(self._motion, self._motion)) < LIMITS[at.A] ** 2:
+        if not all(float(np.dot(row, row)) < limit for row, limit in self._rows):  # not a number is not less, either
             self._runaway(step, time, position)
         if not self._normal.min() > 0.0:
             self._lifts(step, time, position)
@@ -186,9 +185,12 @@ class Guard:
     def _runaway(self, step: int, time: float, position: float) -> None:
         """Say which trains' numbers have run away, and what of them first."""
         for train in range(int(self.model.dims[at.TRAINS])):
-            worst, what = max(self._excess(train), key=lambda found: found[0])
+            found = self._excess(train)
+            worst = max(excess for excess, _ in found)
             if worst < 1.0:
                 continue
+            first = [words for excess, words in found if excess == worst]  # several, once all are not-a-numbers
+            what = first[0] if len(first) == 1 else f"one of {', '.join(first)}"
             shorter = 0.5 * self.model.given.newmark.dt
             words = (
                 f"numbers ran away, first of {what}; try numerics.time_step = {shorter:g}, more passes, or look at the"

@@ -114,7 +114,7 @@ def _checks(name: str, checks: Sequence[Found]) -> Iterator[Row]:
             said = f"exit status {each['status']}; {said}"
         if "late" in each:
             said = f"after {each['late'] * 1e3:.1f} ms: {said}"
-        wrong = "; ".join(map(str, each["wrong"]))
+        wrong = "; ".join(map(str, each.get("wrong", [])))
         yield name, each["words"], _one_line(f"{said} **{wrong}**" if wrong else said), each["good"]
 
 

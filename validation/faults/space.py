@@ -129,7 +129,8 @@ def estimates(folder: Path) -> list[Check]:
         path.unlink()
         words = f"estimated size: {' '.join((name, *settings))}"
         off = estimate / true - 1.0
-        found.append({"words": words, "good": 0.0 <= off <= 0.1, "true": true, "estimate": estimate, "off": off})
+        good = 0.0 <= off <= 0.1
+        found.append({"words": words, "good": good, "true": true, "estimate": estimate, "off": off, "wrong": []})
     return found
 
 
