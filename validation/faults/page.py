@@ -64,6 +64,7 @@ def page(known: Mapping[str, Found]) -> str:
         f"{sum(bool(row[3]) for row in judged)} of {len(judged)} good. Written by `python -m validation.faults`;",
         "`docs/robustness.md` says what is promised.",
         "",
+        *_summary(known),
         *_circumstances(known),
     ]
     for part in known.values():
@@ -116,6 +117,24 @@ def _checks(name: str, checks: Sequence[Found]) -> Iterator[Row]:
             said = f"after {each['late'] * 1e3:.1f} ms: {said}"
         wrong = "; ".join(map(str, each.get("wrong", [])))
         yield name, each["words"], _one_line(f"{said} **{wrong}**" if wrong else said), each["good"]
+
+
+def _summary(known: Mapping[str, Found]) -> Iterator[str]:
+    """All kills in a sentence, and how well trains that ran away were named."""
+    killed = [part["summary"] for part in known.values() if "summary" in part]
+    if killed:
+        survived, kills, kept = (sum(each[name] for each in killed) for name in ("survived", "kills", "kept"))
+        largest = max(each["lost_bytes_largest"] for each in killed)
+        yield f"**kill -9: {survived} of {kills} ended with the same bits; in {kills - kept} a committed sample was lost.**"
+        yield f"At most {largest / 1e6:.1f} MB had been written since the last commit: these runs commit every thousand"
+        yield "steps; a run with default settings every 5 s. Nothing of it is missing in the end."
+    spoilt = [each for each in known.get("physics", {}).get("checks", []) if "late" in each]
+    if spoilt:
+        named = sum(each["named"] for each in spoilt)
+        yield f"Of {len(spoilt)} trains whose numbers were spoilt, each was stopped after"
+        yield f"{max(each['late'] for each in spoilt) * 1e3:.1f} ms at most; {named} times the sentence names the part that"
+        yield "was spoilt, else another part of the train, over which it had spread by then."
+    yield ""
 
 
 def _circumstances(known: Mapping[str, Found]) -> list[str]:
