@@ -125,15 +125,15 @@ def _summary(known: Mapping[str, Found]) -> Iterator[str]:
     if killed:
         survived, kills, kept = (sum(each[name] for each in killed) for name in ("survived", "kills", "kept"))
         largest = max(each["lost_bytes_largest"] for each in killed)
-        yield f"**kill -9: {survived} of {kills} ended with the same bits; in {kills - kept} a committed sample was lost.**"
+        yield f"**kill -9: {survived} of {kills} ended with the same bits, {kills - kept} lost a committed sample.**"
         yield f"At most {largest / 1e6:.1f} MB had been written since the last commit: these runs commit every thousand"
         yield "steps; a run with default settings every 5 s. Nothing of it is missing in the end."
     spoilt = [each for each in known.get("physics", {}).get("checks", []) if "late" in each]
     if spoilt:
         named = sum(each["named"] for each in spoilt)
         yield f"Of {len(spoilt)} trains whose numbers were spoilt, each was stopped after"
-        yield f"{max(each['late'] for each in spoilt) * 1e3:.1f} ms at most; {named} times the sentence names the part that"
-        yield "was spoilt, else another part of the train, over which it had spread by then."
+        yield f"{max(each['late'] for each in spoilt) * 1e3:.1f} ms at most; {named} times the sentence names the part"
+        yield "that was spoilt, else another part of the train, over which it had spread by then."
     yield ""
 
 
