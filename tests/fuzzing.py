@@ -18,7 +18,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 BAD = 1000
 """Refused inputs of each kind in the slow suite."""

@@ -22,8 +22,8 @@ import tiengine
 from tiengine import results
 from tiengine.channels import WHEEL
 from tiengine.cli import main
-from tiengine.events import RunStoppedError
-from tiengine.presets import KINDS, preset_names
+from tiengine.parameters.errors import RunStoppedError
+from tiengine.parameters.presets import KINDS, preset_names
 from tiengine.scenario import to_toml
 from tiengine.writer import GroupSpec, TrainLabels, Writer
 

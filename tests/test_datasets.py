@@ -11,7 +11,7 @@ import pytest
 from tiengine import results
 from tiengine.channels import SEATS, WHEEL
 from tiengine.groups import Block, GroupSpec, TrainLabels
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.writer import Writer
 
 OFFSETS = np.array([10.0, 7.5, -7.5, -10.0])

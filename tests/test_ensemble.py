@@ -21,9 +21,8 @@ from click.testing import CliRunner
 from tiengine import results, simulate
 from tiengine.checkpoint import checkpoint_paths
 from tiengine.cli import main
-from tiengine.events import RunFailedError
+from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.plan import plan
-from tiengine.quantity import InputError
 from tiengine.results import Result
 from tiengine.scenario import Scenario, load_scenario, to_toml
 

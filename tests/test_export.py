@@ -19,7 +19,7 @@ from tiengine.channels import BODY, GAUGE_MOTION, IRREGULARITY, SEATS, WHEEL, Ch
 from tiengine.cli import main
 from tiengine.export import export
 from tiengine.groups import Block, GroupSpec, TrainLabels
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.writer import Writer
 
 LABELS = TrainLabels(["coach"], ["car", "frame 1"], np.zeros(4, np.int64), np.array([10.0, 7.5, -7.5, -10.0]))

@@ -17,12 +17,12 @@ import pytest
 from tiengine import cli_run, gather, journal, results, simulate, worker
 from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
 from tiengine.disk_space import check_space, estimated_bytes
-from tiengine.events import Event, RunFailedError
+from tiengine.events import Event
 from tiengine.file_lock import locked, release
 from tiengine.gather import Gathering
 from tiengine.groups import Block, GroupSpec, TrainLabels
 from tiengine.journal import atomic_write, journal_of
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.scenario import load_scenario
 from tiengine.writer import Writer
 from validation.faults.contents import contents, litter

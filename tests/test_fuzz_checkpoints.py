@@ -13,7 +13,7 @@ import pytest
 from hypothesis import strategies as st
 
 from tiengine.checkpoint import Checkpoint, checkpoint_path, sealed
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 from .fuzzing import DAMAGES, EXAMPLES, ODD, Damage, mutated_texts, on_many, refused
 

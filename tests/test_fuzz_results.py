@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 import tiengine
 from tiengine import simulate
 from tiengine.cli import main
-from tiengine.events import RunStoppedError
 from tiengine.gather import Gathering
+from tiengine.parameters.errors import RunStoppedError
 from tiengine.plan import Task
 from tiengine.results import RUNNING
 from tiengine.writer import Writer

@@ -19,10 +19,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from tiengine import simulate
-from tiengine.events import RunFailedError
 from tiengine.fields import NumberOr
-from tiengine.input_files import parse_toml
-from tiengine.quantity import InputError, Params, build
+from tiengine.parameters.errors import InputError, RunFailedError
+from tiengine.parameters.input_files import parse_toml
+from tiengine.parameters.quantity import Params, build
 from tiengine.scenario import Scenario, load_scenario, to_toml
 
 from .fuzzing import BAD, EXAMPLES, mutated_texts, on_many, refused

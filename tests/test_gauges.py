@@ -10,7 +10,7 @@ import pytest
 from tiengine.gauge_samples import RailPlace, SlabPlace
 from tiengine.gauges import nearest_seat, slab_under
 from tiengine.kernels import layout as at
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.scenario import load_scenario, to_toml
 from tiengine.state import State
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tiengine.irregularity import IrregularityParams, from_function, make_irregularity
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 FAR = -1e9  # the irregularity has begun long before any chainage of these tests
 MEASURED = "x,z_v,theta\n# by hand\n" + "".join(f"{x},{0.001 * (x % 3)},{1e-4 * x}\n" for x in range(0, 100, 2))

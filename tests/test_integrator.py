@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from tiengine.integrator import Newmark, inverse, seat_inverse_terms, seat_shapes
 from tiengine.kernels import layout as at
 from tiengine.model import Model
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper
 

@@ -15,7 +15,8 @@ from tiengine.irregularity import (
     at_wheels,
     make_irregularity,
 )
-from tiengine.quantity import InputError, explain
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.quantity import explain
 from tiengine.spectrum import (
     CHANNELS,
     band_variances,

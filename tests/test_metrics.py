@@ -15,8 +15,8 @@ from tiengine.channels import WHEEL
 from tiengine.cli import main
 from tiengine.metrics import evaluate
 from tiengine.metrics_table import metrics_table
+from tiengine.parameters.errors import InputError
 from tiengine.profile_tables import show
-from tiengine.quantity import InputError
 from tiengine.ride import Ride
 from tiengine.scenario import Scenario, load_scenario, to_toml
 from tiengine.train import assemble, static_wheel_loads

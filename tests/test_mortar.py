@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from tiengine.kernels import mortar as kernel
 from tiengine.mortar import GAUSS, Mortar, MortarVoid, bed_factors
-from tiengine.quantity import InputError, build
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.quantity import build
 from tiengine.slab import Slab, SlabMatrices, load_slab, slab_designs
 
 ROUNDING = np.finfo(float).eps

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tiengine.mortar import MortarVoid
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.scenario import load_scenario
 from tiengine.simulate import run
 from tiengine.slab import load_slab, slab_matrices

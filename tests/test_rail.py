@@ -8,8 +8,9 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
-from tiengine.presets import find_preset, load_toml
-from tiengine.quantity import build
+from tiengine.parameters.input_files import load_toml
+from tiengine.parameters.presets import find_preset
+from tiengine.parameters.quantity import build
 from tiengine.rail import Rail, RailWindow, sine_products
 from tiengine.state import State, positions
 

@@ -14,8 +14,7 @@ import pytest
 
 from tiengine import results, simulate
 from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths, sealed
-from tiengine.events import RunStoppedError
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError, RunStoppedError
 from tiengine.scenario import Scenario, load_scenario
 
 SHORT = {

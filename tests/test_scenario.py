@@ -11,9 +11,10 @@ import pytest
 
 from tiengine.defects import FailedFastenings, MortarDefect, fastening_factors
 from tiengine.overrides import parse_value
-from tiengine.presets import KINDS, find_preset, load_toml, preset_names, preset_source
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import load_toml
+from tiengine.parameters.presets import KINDS, find_preset, preset_names, preset_source
 from tiengine.profile import load_profile
-from tiengine.quantity import InputError
 from tiengine.scenario import check_wavelength, load_scenario, to_toml
 from tiengine.vehicle import load_vehicle
 

@@ -7,7 +7,7 @@ import pytest
 
 from tiengine import simulate
 from tiengine.kernels import layout as at
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.scenario import load_scenario
 from tiengine.stability import TOLERATED_GROWTH, energy_growth
 from tiengine.train import static_wheel_loads

@@ -10,7 +10,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from tiengine.mortar import Mortar, MortarVoid
-from tiengine.quantity import InputError, build
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.quantity import build
 from tiengine.slab import GRAVITY, Slab, SlabMatrices, load_slab, slab_designs, slab_matrices, slab_names
 from validation.closed_forms.plate_ritz import frequencies
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.spectrum import (
     CHANNELS,
     band_variances,

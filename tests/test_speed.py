@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.speed import SpeedProfile
 
 BRAKING = SpeedProfile.table([0.0, 200.0, 350.0, 600.0], [97.2, 90.0, 92.0, 80.0])

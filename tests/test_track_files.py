@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tiengine.irregularity import IrregularityParams, at_wheels, make_irregularity
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.track_files import LEVEL_BASE, band_passed, read_series
 
 DATA = Path(__file__).parent / "data"

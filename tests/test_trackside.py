@@ -10,8 +10,7 @@ import pytest
 import xarray
 
 from tiengine import march, results, simulate
-from tiengine.events import RunFailedError
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.results import Result
 from tiengine.scenario import load_scenario
 

@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 
-from tiengine.presets import find_preset, load_toml
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import load_toml
+from tiengine.parameters.presets import find_preset
 from tiengine.train import assemble, static_wheel_loads, train_centres
 from tiengine.vehicle import load_vehicle
 

@@ -10,8 +10,10 @@ from scipy.linalg import eigh, expm
 
 from tiengine.coach import Coach, expand
 from tiengine.connector import Body, Damper, Spring, Stop, end_motion, prolonged
-from tiengine.presets import find_preset, load_toml, preset_source
-from tiengine.quantity import InputError, build
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import load_toml
+from tiengine.parameters.presets import find_preset, preset_source
+from tiengine.parameters.quantity import build
 from tiengine.train import assemble, static_wheel_loads
 from tiengine.vehicle import load_vehicle, vehicle_from_table, vehicle_names
 

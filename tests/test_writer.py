@@ -13,7 +13,7 @@ import xarray
 from tiengine import results
 from tiengine.channels import BODY, DOFS, IRREGULARITY, WHEEL
 from tiengine.output_file import check_output
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.scenario import load_scenario, to_toml
 from tiengine.writer import GroupSpec, TrainLabels, Writer
 

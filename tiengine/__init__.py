@@ -11,7 +11,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tiengine.quantity import InputError as InputError
+    from tiengine.parameters.errors import InputError as InputError
     from tiengine.results import Result as Result
     from tiengine.results import open as open
     from tiengine.scenario import load_scenario as load_scenario
@@ -22,7 +22,7 @@ __version__ = metadata.version("tiengine")
 __all__ = ["InputError", "Result", "load_scenario", "open", "resume", "run"]
 
 _HOMES = {
-    "InputError": "tiengine.quantity",
+    "InputError": "tiengine.parameters.errors",
     "Result": "tiengine.results",
     "load_scenario": "tiengine.scenario",
     "open": "tiengine.results",

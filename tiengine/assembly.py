@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.connector import Body, Damper, Direction, Joint, Spring, end_motion
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.vehicle import Vehicle
 
 __all__ = ["Assembly", "Element", "Placed", "longitudinal_push", "spin_push"]

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 from numpy.typing import NDArray
 
-from tiengine.presets import nearest
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError, nearest
 from tiengine.results import OPTIONAL
 
 if TYPE_CHECKING:

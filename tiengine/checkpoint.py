@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.input_files import LARGEST_CHECKPOINT, check_regular
 from tiengine.journal import atomic_write
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import LARGEST_CHECKPOINT, check_regular
 
 __all__ = ["Checkpoint", "checkpoint_path", "checkpoint_paths", "sealed"]
 

@@ -17,8 +17,8 @@ from typing import Any
 import click
 
 from tiengine import cli_results, cli_run
-from tiengine.presets import KINDS, preset_names, preset_source
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.presets import KINDS, preset_names, preset_source
 from tiengine.screen import print_rows
 
 __all__ = ["main"]
@@ -78,7 +78,7 @@ def profile(
         check_output(file, force=True)
 
     from tiengine import profiling
-    from tiengine.events import RunFailedError
+    from tiengine.parameters.errors import RunFailedError
 
     try:
         with _ended_by_sigterm():
@@ -122,8 +122,8 @@ def contact(
     from tiengine.contact_geometry import ContactSettings
     from tiengine.contact_report import contact_report, draw
     from tiengine.output_file import check_output
+    from tiengine.parameters.quantity import build
     from tiengine.profile import ROUNDING_LENGTH, load_profile
-    from tiengine.quantity import build
 
     length = ROUNDING_LENGTH if smoothing is None else smoothing
     if not math.isfinite(length):  # click takes it for one within the range

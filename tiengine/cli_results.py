@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from tiengine.figures.catalogue import COMPARE, names
-from tiengine.input_files import parse_toml
+from tiengine.parameters.input_files import parse_toml
 from tiengine.screen import SUMMARY, print_rows, summary
 
 __all__ = ["COMMANDS"]

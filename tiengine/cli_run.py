@@ -98,7 +98,7 @@ COMMANDS = (run, resume)
 
 def _watched(simulation: Callable[..., Result], path: Path, name: str, quiet: bool) -> None:
     """Run with a bar on the screen; say how it ended."""
-    from tiengine.events import RunFailedError, RunStoppedError
+    from tiengine.parameters.errors import RunFailedError, RunStoppedError
 
     console = Console(stderr=True, quiet=quiet, highlight=False)
     with _stopped_by_signals(console) as stop:

@@ -25,7 +25,7 @@ from tiengine.connector import (
     check_damper,
     check_stop,
 )
-from tiengine.quantity import Name, Params, Q, Source
+from tiengine.parameters.quantity import Name, Params, Q, Source
 
 __all__ = ["Coach", "expand"]
 

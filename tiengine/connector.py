@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from tiengine.quantity import Name, Params, Q
+from tiengine.parameters.quantity import Name, Params, Q
 
 __all__ = [
     "Body",

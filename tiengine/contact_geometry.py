@@ -23,8 +23,9 @@ from scipy.ndimage import correlate1d
 from tiengine.contact_search import Contacts, find_contacts, transverse_curvature
 from tiengine.hertz import hertz, zhai_G
 from tiengine.kalker import kalker
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.quantity import Params, Q
 from tiengine.profile import Profile
-from tiengine.quantity import InputError, Params, Q
 
 __all__ = ["ContactSettings", "ContactTable", "WheelRailPair", "build_contact_table"]
 

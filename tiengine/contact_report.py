@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from tiengine.conicity import equivalent_conicity, wheelset_position
 from tiengine.contact_geometry import ContactSettings, WheelRailPair
 from tiengine.figures.palette import BLUE, GREEN, ORANGE, VERMILION
+from tiengine.parameters.errors import InputError
 from tiengine.profile import Profile
-from tiengine.quantity import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

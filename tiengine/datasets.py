@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 if TYPE_CHECKING:
     import h5py

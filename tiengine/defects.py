@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from tiengine.mortar import MortarVoid, bed_factors
-from tiengine.quantity import InputError, Params, Q
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.quantity import Params, Q
 from tiengine.slab import Slab
 
 __all__ = ["FailedFastenings", "MortarDefect", "check_defects", "fastening_factors"]

@@ -11,7 +11,7 @@ import numpy as np
 from tiengine.channels import DOFS
 from tiengine.deflection import window_points
 from tiengine.groups import CHUNK
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.recorder import Recorder
 from tiengine.scenario import Scenario
 from tiengine.trackside import trackside_groups

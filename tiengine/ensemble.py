@@ -22,7 +22,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
-from tiengine.quantity import InputError, Params, Q
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.quantity import Params, Q
 
 __all__ = ["Ensemble"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple
 
-from tiengine.quantity import Params, Q
+from tiengine.parameters.quantity import Params, Q
 
-__all__ = ["EVENT_KINDS", "Event", "Events", "RunFailedError", "RunStoppedError"]
+__all__ = ["EVENT_KINDS", "Event", "Events"]
 
 EVENT_KINDS = ("derailment", "flange_climb", "wheel_lift", "track_end")
 
@@ -54,11 +54,3 @@ class Event(NamedTuple):
     def __str__(self) -> str:
         """One sentence."""
         return f"{self.words} (t = {self.time:.4f} s, chainage {self.position:.2f} m)"
-
-
-class RunFailedError(RuntimeError):
-    """A run that ended early: the message says where, when and why."""
-
-
-class RunStoppedError(RuntimeError):
-    """A run that was asked to stop and can be resumed: the message says how far it came."""

@@ -19,7 +19,7 @@ import numpy as np
 
 from tiengine.channel_table import ChannelTable, channel_table, chosen
 from tiengine.output_file import check_output
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 if TYPE_CHECKING:
     from tiengine.results import Result

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.quantity import Name, Params, Q, Source
+from tiengine.parameters.quantity import Name, Params, Q, Source
 
 __all__ = ["Fastening", "seat_count", "seat_tables"]
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from tiengine.journal import journal_of, recover
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 __all__ = ["locked", "release", "settle", "sweep"]
 

@@ -15,7 +15,7 @@ from tiengine.disk_space import duration
 from tiengine.events import Event
 from tiengine.memory import peak_memory
 from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.results import COMPLETE, RUNNING, Result
 from tiengine.scenario import Scenario
 from tiengine.writer import Writer

@@ -18,7 +18,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from tiengine.quantity import InputError, Params, Q
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.quantity import Params, Q
 from tiengine.slab import Slab
 
 __all__ = ["Gauge", "check_gauges", "nearest_seat", "slab_under"]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.realisation import BlockSpline, sampled_spline
 
 __all__ = [

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from tiengine.fastening import Fastening
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.rail import RailWindow
 from tiengine.slab import SlabMatrices
 

@@ -21,8 +21,8 @@ from tiengine.given_track import (
     function_spline,
     smooth_step,
 )
-from tiengine.presets import nearest
-from tiengine.quantity import InputError, Params, Q
+from tiengine.parameters.errors import InputError, nearest
+from tiengine.parameters.quantity import Params, Q
 from tiengine.realisation import BlockSpline, noise_spline
 from tiengine.spectrum import (
     CHANNELS,

@@ -24,9 +24,9 @@ from tiengine.kernels import layout as at
 from tiengine.memory import peak_memory
 from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
 from tiengine.model import Model
+from tiengine.parameters.errors import InputError
 from tiengine.plan import Task
 from tiengine.prepare import prepare
-from tiengine.quantity import InputError
 from tiengine.recorder import Recorder
 from tiengine.scenario import Scenario
 from tiengine.start import equilibrium, release

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tiengine import comfort, en14363, gb5599
 from tiengine.index import Index
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.ride import Ride
 
 if TYPE_CHECKING:

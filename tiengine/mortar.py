@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationInfo, field_validator
 
-from tiengine.quantity import InputError, Params, Q
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.quantity import Params, Q
 
 __all__ = ["GAUSS", "Mortar", "MortarVoid", "bed_factors"]
 

@@ -24,7 +24,7 @@ from filelock import FileLock
 from tiengine.checkpoint import checkpoint_paths
 from tiengine.file_lock import locked, release, sweep
 from tiengine.journal import JournalledFile, journal_of, recover, sync_folder
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.results import COMPLETE, FORMAT, FORMAT_VERSION, RUNNING, Result
 from tiengine.results import open as open_result
 

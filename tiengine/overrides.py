@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tiengine.input_files import DEEPEST, plain_toml, to_tuples
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import DEEPEST, plain_toml, to_tuples
 
 __all__ = ["Overrides", "apply_overrides", "parse_value"]
 

@@ -10,7 +10,7 @@ from tiengine import backend
 from tiengine.integrator import Newmark
 from tiengine.irregularity import IrregularityParams, make_irregularity
 from tiengine.model import Ingredients, Model, build_model
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.scenario import Scenario, check_wavelength, load_scenario, to_toml
 from tiengine.sections import Output
 from tiengine.setup import ingredients

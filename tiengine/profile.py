@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from tiengine.presets import is_file
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import is_file
 from tiengine.profile_files import read_profile
 from tiengine.profile_frame import FEWEST_POINTS, Kind, increasing_run, placed, smoothing_curve
-from tiengine.quantity import InputError
 
 __all__ = ["Kind", "Profile", "load_profile", "profile_names"]
 

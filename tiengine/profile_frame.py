@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_smoothing_spline
 
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 __all__ = [
     "FEWEST_POINTS",

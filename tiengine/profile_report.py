@@ -9,9 +9,9 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from tiengine.input_files import LARGEST_TOML, read_bytes
 from tiengine.machine import Machine
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import LARGEST_TOML, read_bytes
 from tiengine.roofs import Roofs
 
 __all__ = ["Comparison", "Loop", "Memory", "ProfileReport", "Rate", "Stage", "Wall", "compare", "read_json"]

@@ -21,10 +21,10 @@ from tiengine.kernels import layout as at
 from tiengine.machine import import_seconds, this_machine, versions
 from tiengine.march import CHUNK_STEPS, Run
 from tiengine.memory import peak_memory
+from tiengine.parameters.errors import InputError
 from tiengine.plan import Task, plan
 from tiengine.products import Work, count_products
 from tiengine.profile_report import Loop, Memory, ProfileReport, Rate, Stage, Wall
-from tiengine.quantity import InputError
 from tiengine.roofs import Roofs, measure_roofs
 from tiengine.scenario import Scenario, load_scenario, to_toml
 from tiengine.stage_split import contact_us, suspension_us

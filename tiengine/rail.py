@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.special import zeta
 
-from tiengine.quantity import Name, Params, Q, Source
+from tiengine.parameters.quantity import Name, Params, Q, Source
 
 __all__ = ["Rail", "RailWindow", "sine_products"]
 

@@ -22,7 +22,7 @@ from tiengine.key_figures import key_figures, summarise
 from tiengine.metrics import Metrics
 from tiengine.metrics_table import notes
 from tiengine.output_file import check_output
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.results import COMPLETE
 from tiengine.scenario_words import scenario_words
 from tiengine.screen import summary

@@ -13,7 +13,7 @@ from typing import Any
 
 import h5py
 
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 __all__ = ["check_train", "readable", "unreadable"]
 

@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.file_lock import settle
-from tiengine.input_files import parse_toml
 from tiengine.journal import journal_of
-from tiengine.presets import is_file, nearest
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError, nearest
+from tiengine.parameters.input_files import is_file, parse_toml
 from tiengine.result_layout import check_train, readable, unreadable
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.filters import low_pass
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.train import TrainModel, assemble, static_wheel_loads
 
 if TYPE_CHECKING:

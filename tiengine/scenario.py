@@ -19,13 +19,14 @@ from tiengine.defects import check_defects
 from tiengine.ensemble import Ensemble
 from tiengine.events import Events
 from tiengine.gauges import Gauge, check_gauges
-from tiengine.input_files import to_tuples
 from tiengine.irregularity import IrregularityParams
 from tiengine.mortar import MortarVoid
 from tiengine.overrides import Overrides, apply_overrides
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import load_toml, to_tuples, user_path
+from tiengine.parameters.presets import find_preset
+from tiengine.parameters.quantity import Params, PlainName, Source, build
 from tiengine.parts import Parts, build_parts, collect_presets
-from tiengine.presets import find_preset, load_toml, user_path
-from tiengine.quantity import InputError, Params, PlainName, Source, build
 from tiengine.sections import Contact, Numerics, Output, Track, Train
 
 __all__ = ["Scenario", "check_wavelength", "load_scenario", "to_toml"]

@@ -12,8 +12,8 @@ from pydantic import BeforeValidator, Field
 from tiengine.channels import BODY, IRREGULARITY, WHEEL
 from tiengine.defects import FailedFastenings, MortarDefect
 from tiengine.fields import channel_names, check_speed, number_or
+from tiengine.parameters.quantity import Params, Q
 from tiengine.parts import Part
-from tiengine.quantity import Params, Q
 from tiengine.speed import SpeedProfile
 
 __all__ = ["Contact", "Numerics", "Output", "Track", "Train"]

@@ -12,7 +12,7 @@ from tiengine.contact_geometry import ContactSettings
 from tiengine.defects import fastening_factors
 from tiengine.integrator import Newmark
 from tiengine.model import Ingredients, SlabDesigns
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.scenario import Scenario
 from tiengine.slab import slab_designs
 from tiengine.train import TrainModel, assemble

@@ -2,39 +2,36 @@
 
 from __future__ import annotations
 
+import os
 import time
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
-_clock = time.perf_counter()  # importing the engine's packages is part of what a user waits for
+from threadpoolctl import threadpool_limits
 
-import os  # noqa: E402
-from collections.abc import Callable, Generator, Sequence  # noqa: E402
-from contextlib import closing  # noqa: E402
-from dataclasses import dataclass  # noqa: E402
-from pathlib import Path  # noqa: E402
-from typing import Any  # noqa: E402
+from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
+from tiengine.disk_space import check_space
+from tiengine.gather import Gathering, Progress, Tell
+from tiengine.groups import GroupSpec
+from tiengine.march import march, never
+from tiengine.messages import Message
+from tiengine.output_file import check_output
+from tiengine.parameters.errors import InputError, RunFailedError, RunStoppedError
+from tiengine.plan import Task, plan
+from tiengine.prepare import AUTO_STEPS, prepare
+from tiengine.recorder import Recorder
+from tiengine.results import Result
+from tiengine.results import open as open_result
+from tiengine.scenario import Scenario, load_scenario, to_toml
+from tiengine.simulation import IMPORT_BEGAN
+from tiengine.trackside import trackside_groups
+from tiengine.worker import distribute
+from tiengine.writer import Writer
 
-from threadpoolctl import threadpool_limits  # noqa: E402
-
-from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths  # noqa: E402
-from tiengine.disk_space import check_space  # noqa: E402
-from tiengine.events import RunFailedError, RunStoppedError  # noqa: E402
-from tiengine.gather import Gathering, Progress, Tell  # noqa: E402
-from tiengine.groups import GroupSpec  # noqa: E402
-from tiengine.march import march, never  # noqa: E402
-from tiengine.messages import Message  # noqa: E402
-from tiengine.output_file import check_output  # noqa: E402
-from tiengine.plan import Task, plan  # noqa: E402
-from tiengine.prepare import AUTO_STEPS, prepare  # noqa: E402
-from tiengine.quantity import InputError  # noqa: E402
-from tiengine.recorder import Recorder  # noqa: E402
-from tiengine.results import Result  # noqa: E402
-from tiengine.results import open as open_result  # noqa: E402
-from tiengine.scenario import Scenario, load_scenario, to_toml  # noqa: E402
-from tiengine.trackside import trackside_groups  # noqa: E402
-from tiengine.worker import distribute  # noqa: E402
-from tiengine.writer import Writer  # noqa: E402
-
-IMPORT_SECONDS = time.perf_counter() - _clock
+IMPORT_SECONDS = time.perf_counter() - IMPORT_BEGAN
 
 __all__ = ["AUTO_STEPS", "CHECKPOINT_SECONDS", "Progress", "prepare", "resume", "run"]
 

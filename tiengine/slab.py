@@ -19,9 +19,11 @@ from pydantic import ValidationInfo, field_validator
 
 from tiengine.kernels import plate
 from tiengine.mortar import GAUSS, Mortar, MortarVoid, bed_factors
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import load_toml
+from tiengine.parameters.presets import find_preset, preset_names
+from tiengine.parameters.quantity import Params, Q, build
 from tiengine.plate_shapes import WY, W, element_dofs, shapes_at, tabulate_shapes
-from tiengine.presets import find_preset, load_toml, preset_names
-from tiengine.quantity import InputError, Params, Q, build
 
 __all__ = ["GRAVITY", "Slab", "SlabMatrices", "load_slab", "slab_designs", "slab_matrices", "slab_names"]
 

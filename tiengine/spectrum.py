@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from tiengine.presets import find_preset, load_toml, nearest
-from tiengine.quantity import InputError, Params, Q, build
+from tiengine.parameters.errors import InputError, nearest
+from tiengine.parameters.input_files import load_toml
+from tiengine.parameters.presets import find_preset
+from tiengine.parameters.quantity import Params, Q, build
 
 __all__ = [
     "CHANNELS",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 __all__ = ["SpeedProfile"]
 

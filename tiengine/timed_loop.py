@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.events import RunFailedError
 from tiengine.guards import Guard
 from tiengine.irregularity import Irregularity
 from tiengine.march import CHUNK_STEPS
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recorder import Recorder
 from tiengine.scenario import Scenario
 from tiengine.stepper import Stepper

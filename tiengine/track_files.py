@@ -32,9 +32,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
-from tiengine.input_files import LARGEST_TRACK, numbers_of, read_text_file
-from tiengine.presets import nearest
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError, nearest
+from tiengine.parameters.input_files import LARGEST_TRACK, numbers_of, read_text_file
 
 __all__ = ["LEVEL_BASE", "band_passed", "read_series"]
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from tiengine.assembly import Assembly, Element, Placed, longitudinal_push, spin_push
 from tiengine.connector import prolonged
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.vehicle import Vehicle
 
 __all__ = ["GRAVITY", "MOTIONS", "TrainModel", "assemble", "static_wheel_loads", "train_centres"]

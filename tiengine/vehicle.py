@@ -17,9 +17,10 @@ from pydantic import Field, model_validator
 
 from tiengine.coach import Coach, expand
 from tiengine.connector import Body, Damper, SeriesSprings, Spring, Stop
-from tiengine.input_files import to_tuples
-from tiengine.presets import find_preset, load_toml, nearest, preset_names
-from tiengine.quantity import InputError, Name, Params, Q, Source, build
+from tiengine.parameters.errors import InputError, nearest
+from tiengine.parameters.input_files import load_toml, to_tuples
+from tiengine.parameters.presets import find_preset, preset_names
+from tiengine.parameters.quantity import Name, Params, Q, Source, build
 
 __all__ = ["Vehicle", "load_vehicle", "vehicle_from_table", "vehicle_names"]
 

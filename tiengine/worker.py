@@ -218,7 +218,7 @@ def _cause_of_death(worker: _Worker, excusable: bool) -> str:
     Raises:
         RunFailedError: It died before it could take a task, by itself or once too often.
     """
-    from tiengine.events import RunFailedError
+    from tiengine.parameters.errors import RunFailedError
 
     worker.process.join()
     code = worker.process.exitcode or 0

@@ -37,7 +37,7 @@ from tiengine.event_table import EVENTS, create_events, event_columns
 from tiengine.events import Event
 from tiengine.groups import CHUNK, Axis, Block, GroupSpec, TrainLabels
 from tiengine.output_file import DISK_ERRORS, OutputFile, header
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.result_layout import unreadable
 from tiengine.results import Result
 

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact_geometry import WheelRailPair
-from tiengine.events import RunFailedError
+from tiengine.parameters.errors import RunFailedError
 from tiengine.scenario import Scenario, load_scenario
 from tiengine.setup import ingredients
 from tiengine.simulate import run

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine.fastening import Fastening
-from tiengine.presets import find_preset, load_toml
-from tiengine.quantity import build
+from tiengine.parameters.input_files import load_toml
+from tiengine.parameters.presets import find_preset
+from tiengine.parameters.quantity import build
 from tiengine.rail import Rail, RailWindow
 from validation.case import Case
 from validation.closed_forms.floquet import Seats

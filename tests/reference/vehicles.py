@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.presets import find_preset, load_toml
+from tiengine.parameters.input_files import load_toml
+from tiengine.parameters.presets import find_preset
 from tiengine.train import TrainModel
 from tiengine.vehicle import Vehicle, vehicle_from_table
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

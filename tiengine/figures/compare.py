@@ -12,7 +12,7 @@ from tiengine.figures.curve import Band, Curve, bins_for
 from tiengine.figures.palette import BLACK, GREY
 from tiengine.figures.source import Samples, Train
 from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ from tiengine.figures.catalogue import COMPARE, KINDS, kind_named
 from tiengine.figures.source import AbsentError
 from tiengine.figures.style import check_suffix, save
 from tiengine.output_file import check_output
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 if TYPE_CHECKING:
     from tiengine.results import Result

@@ -9,7 +9,7 @@ from tiengine.figures.curve import Curve
 from tiengine.figures.source import AbsentError, Train
 from tiengine.figures.style import LEFT, RIGHT, in_style, limit_line, new_figure
 from tiengine.filters import band_pass
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.ride import Ride
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.filters import low_pass
-from tiengine.input_files import parse_toml
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import parse_toml
 from tiengine.train import TrainModel, assemble, static_wheel_loads
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tiengine.figures.palette import BLACK, BLUE, VERMILION
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 __all__ = ["LEFT", "RIGHT", "Look", "check_suffix", "in_style", "limit_line", "new_figure", "plain", "png", "save"]
 

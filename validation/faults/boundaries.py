@@ -25,7 +25,7 @@ from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
 from tiengine.events import Event
 from tiengine.groups import Block, GroupSpec, TrainLabels
 from tiengine.journal import journal_of
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.writer import Writer
 from validation.faults.contents import contents, litter, reads
 from validation.faults.dying import DIED, Call, at_call, in_copy

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tiengine import results
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from validation.faults.contents import contents, reads, start_of
 from validation.faults.kills import NAME, Yard
 from validation.faults.launch import Process

@@ -14,7 +14,7 @@ import psutil
 
 from tiengine import results
 from tiengine.journal import journal_of
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from validation.faults.contents import Contents, contents, differing, holds, litter, reads, start_of
 from validation.faults.launch import Process, command, copied, keep_shapes
 from validation.faults.plan import Kill, Run

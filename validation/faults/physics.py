@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from tiengine import march, prepare, simulate
-from tiengine.events import RunFailedError
 from tiengine.guards import LIMITS
 from tiengine.kernels import layout as at
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.scenario import load_scenario
 from validation.faults.contents import Contents, contents
 from validation.faults.plan import SEED

@@ -28,7 +28,7 @@ from tiengine.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
 from tiengine.model import CONTACT_TOLERANCE, Ingredients
 from tiengine.mortar import Mortar
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.rail import Rail
 from tiengine.scenario import Scenario
 from tiengine.train import TrainModel, static_wheel_loads

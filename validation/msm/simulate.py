@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from tiengine import backend
 from tiengine.irregularity import Irregularity, make_irregularity
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 from tiengine.recorder import Recorder, Samples
 from tiengine.results import Result
 from tiengine.scenario import Scenario, load_scenario, to_toml

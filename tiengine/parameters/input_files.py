@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError
 
 __all__ = [
     "DEEPEST",
@@ -28,12 +28,16 @@ __all__ = [
     "LONGEST_LINE",
     "SMALLEST_NUMBER",
     "check_regular",
+    "is_file",
+    "load_toml",
     "numbers_of",
     "parse_toml",
     "plain_toml",
     "read_bytes",
+    "read_text",
     "read_text_file",
     "to_tuples",
+    "user_path",
 ]
 
 LARGEST_TOML = 5_000_000  # bytes: tomllib reads 1 MB a second; a scenario with its profiles has 0.1 MB
@@ -222,3 +226,62 @@ def to_tuples(value: Any, where: str = "", depth: int = 0) -> Any:
         case _ if type(value).__module__ == "datetime":
             raise InputError(f"{where} = {value}: must not be a date or time")
     return value
+
+
+def user_path(text: str, folder: Path | None, called: str) -> Path:
+    """A path that a user wrote.
+
+    Args:
+        text: Absolute, or relative to ``folder``; ``~`` is the home folder.
+        folder: The folder of the scenario file; the working directory if None.
+        called: What the message calls it.
+
+    Raises:
+        InputError: ``~`` stands for nobody.
+    """
+    try:
+        return (folder or Path()) / Path(text).expanduser()
+    except RuntimeError as error:
+        raise InputError(f"{called} = {text!r}: {error}") from None
+
+
+def is_file(path: Path) -> bool:
+    """Whether a regular file is there; no for names that no file can have.
+
+    Args:
+        path: What was asked for.
+    """
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def load_toml(path: Path | str) -> dict[str, Any]:
+    """Read a TOML file; arrays become tuples, since parameters are frozen.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The tables, nested; numbers, texts, booleans and tuples.
+
+    Raises:
+        InputError: The file is missing, unreadable, too large or not TOML; the message names file and line.
+    """
+    return parse_toml(read_text(path), str(path))
+
+
+def read_text(path: Path | str) -> str:
+    """Contents of a text file.
+
+    Args:
+        path: The file.
+
+    Raises:
+        InputError: The file is missing, no regular file, too large or not UTF-8.
+    """
+    try:
+        return read_bytes(path, str(path), LARGEST_TOML).decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a UTF-8 text file") from None

@@ -6,27 +6,19 @@ its bare name (``"CHN60"``) or by the path of a file of the same form (``"my_rai
 
 from __future__ import annotations
 
-import difflib
 from importlib import resources
 from itertools import takewhile
 from pathlib import Path
-from typing import Any
 
-from tiengine.input_files import LARGEST_TOML, parse_toml, read_bytes
-from tiengine.quantity import InputError
+from tiengine.parameters.errors import InputError, nearest
+from tiengine.parameters.input_files import (
+    is_file,
+    load_toml,
+    read_text,
+    user_path,
+)
 
-__all__ = [
-    "KINDS",
-    "LONGEST_PATH",
-    "find_preset",
-    "is_file",
-    "load_toml",
-    "nearest",
-    "preset_names",
-    "preset_source",
-    "read_text",
-    "user_path",
-]
+__all__ = ["KINDS", "LONGEST_PATH", "find_preset", "preset_names", "preset_source"]
 
 KINDS = ("vehicles", "rails", "slabs", "fastenings", "profiles", "irregularity", "scenarios")
 """Folders of the library."""
@@ -66,7 +58,7 @@ def find_preset(kind: str, name_or_path: str, suffix: str = "", folder: Path | N
     """File of a preset of the library or of the user.
 
     A text with a slash or the kind's suffix is a path, anything else a name of the library. Paths may be absolute,
-    begin with ``~`` or lead out of the folder: files are only read (:mod:`tiengine.input_files`).
+    begin with ``~`` or lead out of the folder: files are only read (:mod:`tiengine.parameters.input_files`).
 
     Args:
         kind: One of :data:`KINDS`.
@@ -98,85 +90,9 @@ def find_preset(kind: str, name_or_path: str, suffix: str = "", folder: Path | N
     raise InputError(f"{called} = {name_or_path!r}: no such preset{nearest(name_or_path, preset_names(kind))}")
 
 
-def user_path(text: str, folder: Path | None, called: str) -> Path:
-    """A path that a user wrote.
-
-    Args:
-        text: Absolute, or relative to ``folder``; ``~`` is the home folder.
-        folder: The folder of the scenario file; the working directory if None.
-        called: What the message calls it.
-
-    Raises:
-        InputError: ``~`` stands for nobody.
-    """
-    try:
-        return (folder or Path()) / Path(text).expanduser()
-    except RuntimeError as error:
-        raise InputError(f"{called} = {text!r}: {error}") from None
-
-
-def is_file(path: Path) -> bool:
-    """Whether a regular file is there; no for names that no file can have.
-
-    Args:
-        path: What was asked for.
-    """
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
-
-
 def _is_path(text: str, suffix: str) -> bool:
     """Whether a text means a file rather than a preset (names hold neither slashes nor known suffixes)."""
     return "/" in text or "\\" in text or Path(text).suffix.lower() in {suffix, *_PATH_SUFFIXES}
-
-
-def nearest(name: str, known: list[str] | tuple[str, ...]) -> str:
-    """Tail of an error message: the nearest known name, or all of them.
-
-    Args:
-        name: What was asked for.
-        known: What there is.
-
-    Returns:
-        ``"; did you mean 'CHN60'?"``, ``"; known: CHN60, 60E1"`` or an empty text where nothing is known.
-    """
-    folded = {k.casefold(): k for k in known}
-    close = difflib.get_close_matches(name.casefold(), list(folded), n=1)
-    if close:
-        return f"; did you mean {folded[close[0]]!r}?"
-    return f"; known: {', '.join(known)}" if known else ""
-
-
-def load_toml(path: Path | str) -> dict[str, Any]:
-    """Read a TOML file; arrays become tuples, since parameters are frozen.
-
-    Args:
-        path: The file.
-
-    Returns:
-        The tables, nested; numbers, texts, booleans and tuples.
-
-    Raises:
-        InputError: The file is missing, unreadable, too large or not TOML; the message names file and line.
-    """
-    return parse_toml(read_text(path), str(path))
-
-
-def read_text(path: Path | str) -> str:
-    """Contents of a text file.
-
-    Args:
-        path: The file.
-
-    Raises:
-        InputError: The file is missing, no regular file, too large or not UTF-8.
-    """
-    try:
-        return read_bytes(path, str(path), LARGEST_TOML).decode("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a UTF-8 text file") from None
 
 
 def preset_source(kind: str, name: str) -> str:

@@ -17,11 +17,12 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-__all__ = ["InputError", "Name", "Params", "PlainName", "Q", "Source", "build", "explain"]
+from tiengine.parameters.errors import InputError
+
+__all__ = ["Name", "Params", "PlainName", "Q", "Source", "build", "explain"]
 
 M = TypeVar("M", bound=BaseModel)
 
-LONGEST_MESSAGE = 1500  # characters
 
 _WORDS = {
     "Value error, ": "",
@@ -33,19 +34,6 @@ _WORDS = {
     "a valid string": "a text",
     "a valid boolean": "true or false",
 }
-
-
-class InputError(ValueError):
-    """Input that breaks a rule; the message is one line naming object, value and rule, and not the whole input."""
-
-    def __init__(self, message: str) -> None:
-        """Shorten what quotes too much.
-
-        Args:
-            message: The sentence.
-        """
-        head, tail = message[: LONGEST_MESSAGE // 2], message[-LONGEST_MESSAGE // 2 :]
-        super().__init__(message if len(message) <= LONGEST_MESSAGE else f"{head} ... {tail}")
 
 
 def Q(unit: str, description: str = "", **rule: Any) -> Any:
