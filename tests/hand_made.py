@@ -9,9 +9,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tiengine import results
-from tiengine.result_layout import LAYOUT
-from tiengine.results import FORMAT, FORMAT_VERSION, Result
+from tiengine.result_files import reader as results
+from tiengine.result_files.damage import LAYOUT
+from tiengine.result_files.reader import FORMAT, FORMAT_VERSION, Result
 from tiengine.scenario import Scenario, load_scenario, to_toml
 from tiengine.train import assemble, static_wheel_loads
 

@@ -19,13 +19,13 @@ import pytest
 from click.testing import CliRunner, Result
 
 import tiengine
-from tiengine import results
-from tiengine.channels import WHEEL
 from tiengine.cli import main
 from tiengine.parameters.errors import RunStoppedError
 from tiengine.parameters.presets import KINDS, preset_names
+from tiengine.result_files import reader as results
+from tiengine.result_files.channels import WHEEL
+from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
 from tiengine.scenario import to_toml
-from tiengine.writer import GroupSpec, TrainLabels, Writer
 
 LABELS = TrainLabels(["coach"], ["car"], np.zeros(4, np.int64), np.array([10.0, 7.5, -7.5, -10.0]))
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tiengine import results
-from tiengine.channels import SEATS, WHEEL
-from tiengine.groups import Block, GroupSpec, TrainLabels
 from tiengine.parameters.errors import InputError
-from tiengine.writer import Writer
+from tiengine.result_files import reader as results
+from tiengine.result_files.channels import SEATS, WHEEL
+from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
+from tiengine.result_files.writer import Writer
 
 OFFSETS = np.array([10.0, 7.5, -7.5, -10.0])
 NAMES = ("vertical_force", "lateral_force")

@@ -18,12 +18,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tiengine import results, simulate
-from tiengine.checkpoint import checkpoint_paths
+from tiengine import simulate
 from tiengine.cli import main
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.plan import plan
-from tiengine.results import Result
+from tiengine.result_files import reader as results
+from tiengine.result_files.checkpoint import checkpoint_paths
+from tiengine.result_files.reader import Result
 from tiengine.scenario import Scenario, load_scenario, to_toml
 
 SHORT = {

@@ -13,14 +13,14 @@ from click.testing import CliRunner
 from pyarrow import parquet
 from scipy.io import loadmat
 
-from tiengine import export as module
-from tiengine import results
-from tiengine.channels import BODY, GAUGE_MOTION, IRREGULARITY, SEATS, WHEEL, Channel
 from tiengine.cli import main
-from tiengine.export import export
-from tiengine.groups import Block, GroupSpec, TrainLabels
 from tiengine.parameters.errors import InputError
-from tiengine.writer import Writer
+from tiengine.result_files import export as module
+from tiengine.result_files import reader as results
+from tiengine.result_files.channels import BODY, GAUGE_MOTION, IRREGULARITY, SEATS, WHEEL, Channel
+from tiengine.result_files.export import export
+from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
+from tiengine.result_files.writer import Writer
 
 LABELS = TrainLabels(["coach"], ["car", "frame 1"], np.zeros(4, np.int64), np.array([10.0, 7.5, -7.5, -10.0]))
 SHAPES = {

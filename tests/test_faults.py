@@ -14,17 +14,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tiengine import cli_run, gather, journal, results, simulate, worker
-from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
+from tiengine import cli_run, gather, simulate, worker
 from tiengine.disk_space import check_space, estimated_bytes
-from tiengine.events import Event
-from tiengine.file_lock import locked, release
 from tiengine.gather import Gathering
-from tiengine.groups import Block, GroupSpec, TrainLabels
-from tiengine.journal import atomic_write, journal_of
 from tiengine.parameters.errors import InputError, RunFailedError
+from tiengine.result_files import journal
+from tiengine.result_files import reader as results
+from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
+from tiengine.result_files.events import Event
+from tiengine.result_files.file_lock import locked, release
+from tiengine.result_files.journal import atomic_write, journal_of
+from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
+from tiengine.result_files.writer import Writer
 from tiengine.scenario import load_scenario
-from tiengine.writer import Writer
 from validation.faults.contents import contents, litter
 from validation.faults.page import page, rows
 from validation.faults.plan import RUNS, kills

@@ -11,7 +11,7 @@ import pytest
 from tiengine.figures import envelopes, gauges, waterfall
 from tiengine.figures.extremes import read_extremes
 from tiengine.figures.source import AbsentError, Train
-from tiengine.results import Result
+from tiengine.result_files.reader import Result
 
 from . import hand_made as by
 

@@ -12,13 +12,13 @@ import pytest
 from click.testing import CliRunner
 
 import tiengine
-from tiengine.checkpoint import Checkpoint
 from tiengine.cli import main
-from tiengine.output_file import check_output
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import parse_toml
 from tiengine.profile import load_profile
 from tiengine.profile_files import MOST_POINTS
+from tiengine.result_files.checkpoint import Checkpoint
+from tiengine.result_files.output_file import check_output
 from tiengine.scenario import load_scenario
 from tiengine.track_files import read_series
 

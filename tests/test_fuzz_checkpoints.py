@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from tiengine.checkpoint import Checkpoint, checkpoint_path, sealed
 from tiengine.parameters.errors import InputError
+from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, sealed
 
 from .fuzzing import DAMAGES, EXAMPLES, ODD, Damage, mutated_texts, on_many, refused
 

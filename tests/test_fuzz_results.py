@@ -19,8 +19,8 @@ from tiengine.cli import main
 from tiengine.gather import Gathering
 from tiengine.parameters.errors import RunStoppedError
 from tiengine.plan import Task
-from tiengine.results import RUNNING
-from tiengine.writer import Writer
+from tiengine.result_files.reader import RUNNING
+from tiengine.result_files.writer import Writer
 
 from .fuzzing import DAMAGES, EXAMPLES, Damage, deadline, on_many, refused
 

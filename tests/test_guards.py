@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tiengine import simulate
-from tiengine.events import Events
 from tiengine.guards import Guard, climbing_shift
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import SHIFT
 from tiengine.parameters.errors import InputError, RunFailedError
+from tiengine.result_files.events import Events
 from tiengine.scenario import Scenario, load_scenario
 from tiengine.state import State
 

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tiengine import results
-from tiengine.channels import WHEEL
 from tiengine.cli import main
 from tiengine.metrics import evaluate
 from tiengine.metrics_table import metrics_table
 from tiengine.parameters.errors import InputError
 from tiengine.profile_tables import show
+from tiengine.result_files import reader as results
+from tiengine.result_files.channels import WHEEL
+from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
 from tiengine.ride import Ride
 from tiengine.scenario import Scenario, load_scenario, to_toml
 from tiengine.train import assemble, static_wheel_loads
-from tiengine.writer import GroupSpec, TrainLabels, Writer
 
 SPEED = 97.0  # m/s, as written
 BODIES = ("car", "frame 1", "frame 2", "wheelset 1", "wheelset 2", "wheelset 3", "wheelset 4")

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from tiengine import results
 from tiengine.cli import main
 from tiengine.figures.catalogue import KINDS
 from tiengine.figures.source import Train
 from tiengine.key_figures import KeyFigure, key_figures, summarise
 from tiengine.report import render
+from tiengine.result_files import reader as results
 from tiengine.scenario import load_scenario
 from tiengine.scenario_words import scenario_words
 

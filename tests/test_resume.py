@@ -12,9 +12,10 @@ import h5py
 import numpy as np
 import pytest
 
-from tiengine import results, simulate
-from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths, sealed
+from tiengine import simulate
 from tiengine.parameters.errors import InputError, RunStoppedError
+from tiengine.result_files import reader as results
+from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths, sealed
 from tiengine.scenario import Scenario, load_scenario
 
 SHORT = {

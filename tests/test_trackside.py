@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 import xarray
 
-from tiengine import march, results, simulate
+from tiengine import march, simulate
 from tiengine.parameters.errors import InputError, RunFailedError
-from tiengine.results import Result
+from tiengine.result_files import reader as results
+from tiengine.result_files.reader import Result
 from tiengine.scenario import load_scenario
 
 from .models import V350

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import xarray
 
-from tiengine import results
-from tiengine.channels import BODY, DOFS, IRREGULARITY, WHEEL
-from tiengine.output_file import check_output
 from tiengine.parameters.errors import InputError
+from tiengine.result_files import reader as results
+from tiengine.result_files.channels import BODY, DOFS, IRREGULARITY, WHEEL
+from tiengine.result_files.output_file import check_output
+from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
 from tiengine.scenario import load_scenario, to_toml
-from tiengine.writer import GroupSpec, TrainLabels, Writer
 
 STEP = 1e-4
 SPEED = 97.0

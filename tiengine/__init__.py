@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tiengine.parameters.errors import InputError as InputError
-    from tiengine.results import Result as Result
-    from tiengine.results import open as open
+    from tiengine.result_files.reader import Result as Result
+    from tiengine.result_files.reader import open as open
     from tiengine.scenario import load_scenario as load_scenario
     from tiengine.simulate import resume as resume
     from tiengine.simulate import run as run
@@ -23,9 +23,9 @@ __all__ = ["InputError", "Result", "load_scenario", "open", "resume", "run"]
 
 _HOMES = {
     "InputError": "tiengine.parameters.errors",
-    "Result": "tiengine.results",
+    "Result": "tiengine.result_files.reader",
     "load_scenario": "tiengine.scenario",
-    "open": "tiengine.results",
+    "open": "tiengine.result_files.reader",
     "resume": "tiengine.simulate",
     "run": "tiengine.simulate",
 }

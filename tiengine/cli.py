@@ -73,7 +73,7 @@ def profile(
 
     resolved = load_scenario(scenario, settings)
     if file is not None:
-        from tiengine.output_file import check_output
+        from tiengine.result_files.output_file import check_output
 
         check_output(file, force=True)
 
@@ -121,9 +121,9 @@ def contact(
     """Show how WHEEL and RAIL, presets or files, touch: rolling radii, conicity, points of contact."""
     from tiengine.contact_geometry import ContactSettings
     from tiengine.contact_report import contact_report, draw
-    from tiengine.output_file import check_output
     from tiengine.parameters.quantity import build
     from tiengine.profile import ROUNDING_LENGTH, load_profile
+    from tiengine.result_files.output_file import check_output
 
     length = ROUNDING_LENGTH if smoothing is None else smoothing
     if not math.isfinite(length):  # click takes it for one within the range

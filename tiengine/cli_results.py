@@ -14,7 +14,8 @@ import click
 
 from tiengine.figures.catalogue import COMPARE, names
 from tiengine.parameters.input_files import parse_toml
-from tiengine.screen import SUMMARY, print_rows, summary
+from tiengine.result_files.summary import SUMMARY, summary
+from tiengine.screen import print_rows
 
 __all__ = ["COMMANDS"]
 
@@ -23,7 +24,7 @@ __all__ = ["COMMANDS"]
 @click.argument("file", type=click.Path(path_type=Path))
 def info(file: Path) -> None:
     """Say what a result FILE holds and how it was made."""
-    from tiengine import results
+    from tiengine.result_files import reader as results
 
     with results.open(file) as result:
         attributes = result.attributes
@@ -47,8 +48,9 @@ def info(file: Path) -> None:
 @click.option("--json", "output", type=click.Path(path_type=Path), help="Write all indices here too, replacing a file.")
 def metrics(file: Path, train: int | None, output: Path | None) -> None:
     """Indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 for a result FILE, beside their limits."""
-    from tiengine import metrics_table, profile_tables, results
-    from tiengine.output_file import check_output
+    from tiengine import metrics_table, profile_tables
+    from tiengine.result_files import reader as results
+    from tiengine.result_files.output_file import check_output
 
     if output is not None:
         check_output(output, force=True)
@@ -67,8 +69,8 @@ def metrics(file: Path, train: int | None, output: Path | None) -> None:
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def export(file: Path, output: Path, train: int, channels: Sequence[str], force: bool) -> None:
     """Write channels of a result FILE as CSV, Parquet or MATLAB (docs/results.md)."""
-    from tiengine import export as exporting
-    from tiengine import results
+    from tiengine.result_files import export as exporting
+    from tiengine.result_files import reader as results
 
     with results.open(file) as result:
         written = exporting.export(result, output, train=train, channels=channels, force=force)
@@ -83,8 +85,8 @@ def export(file: Path, output: Path, train: int, channels: Sequence[str], force:
 @click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="One train of an ensemble.")
 def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, train: int) -> None:
     """Draw figures of a result FILE: one KIND, or all that it can give, into FILE_KIND.png; replaces figures."""
-    from tiengine import results
     from tiengine.figures.files import draw_all, draw_one
+    from tiengine.result_files import reader as results
 
     with ExitStack() as stack:
         result = stack.enter_context(results.open(file))
@@ -105,7 +107,7 @@ def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, 
 def report(file: Path, output: Path | None, train: int | None) -> None:
     """Make one HTML page of a result FILE: scenario, key figures, indices and figures; it needs no network."""
     from tiengine import report as reporting
-    from tiengine import results
+    from tiengine.result_files import reader as results
 
     path = output or file.with_suffix(".html")
     with results.open(file) as result:

@@ -19,10 +19,11 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from tiengine.screen import print_rows, summary
+from tiengine.result_files.summary import summary
+from tiengine.screen import print_rows
 
 if TYPE_CHECKING:
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["COMMANDS"]
 
@@ -62,7 +63,7 @@ def run(
     resolved = load_scenario(scenario, settings)
     path = output or Path(f"{Path(resolved.name).name}.h5")
 
-    from tiengine.output_file import check_output
+    from tiengine.result_files.output_file import check_output
 
     check_output(path, force)
 

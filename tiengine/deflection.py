@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.groups import Block
 from tiengine.kernels import layout as at
 from tiengine.plate_shapes import W, element_dofs, locate, tabulate_shapes
+from tiengine.result_files.layout import Block
 from tiengine.slab import Slab
 from tiengine.stepper import Stepper
 

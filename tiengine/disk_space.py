@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tiengine.channels import DOFS
 from tiengine.deflection import window_points
-from tiengine.groups import CHUNK
 from tiengine.parameters.errors import InputError
 from tiengine.recorder import Recorder
+from tiengine.result_files.channels import DOFS
+from tiengine.result_files.layout import CHUNK
 from tiengine.scenario import Scenario
 from tiengine.trackside import trackside_groups
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.groups import Block
 from tiengine.kernels import layout as at
 from tiengine.model import Model
+from tiengine.result_files.layout import Block
 from tiengine.scenario import Scenario
 from tiengine.slab_moments import moment_operator
 from tiengine.slot_extremes import SlotExtremes

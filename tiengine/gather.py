@@ -10,15 +10,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tiengine.checkpoint import Checkpoint, checkpoint_path
 from tiengine.disk_space import duration
-from tiengine.events import Event
 from tiengine.memory import peak_memory
 from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
 from tiengine.parameters.errors import InputError
-from tiengine.results import COMPLETE, RUNNING, Result
+from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path
+from tiengine.result_files.events import Event
+from tiengine.result_files.reader import COMPLETE, RUNNING, Result
+from tiengine.result_files.writer import Writer
 from tiengine.scenario import Scenario
-from tiengine.writer import Writer
 
 __all__ = ["Gathering", "Progress", "Tell"]
 

@@ -17,13 +17,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.channels import GAUGE_FORCE, GAUGE_MOTION
 from tiengine.envelopes import watched_seats
 from tiengine.gauges import Gauge, nearest_seat, slab_under
-from tiengine.groups import Block
 from tiengine.kernels import layout as at
 from tiengine.model import Model
 from tiengine.plate_shapes import W, shapes_at
+from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION
+from tiengine.result_files.layout import Block
 from tiengine.state import State
 from tiengine.stepper import Stepper
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.channels import DOFS, SIDES
 from tiengine.contact_geometry import ContactTable
-from tiengine.events import EVENT_KINDS, Event, Events
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import SHIFT
+from tiengine.result_files.channels import DOFS, SIDES
+from tiengine.result_files.events import EVENT_KINDS, Event, Events
 from tiengine.stepper import Stepper
 
 __all__ = ["Guard", "Watch"]

@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.checkpoint import Checkpoint
-from tiengine.groups import Block, TrainLabels
 from tiengine.guards import Guard
 from tiengine.irregularity import Irregularity, check_reach, make_irregularity
 from tiengine.kernels import layout as at
@@ -28,6 +26,8 @@ from tiengine.parameters.errors import InputError
 from tiengine.plan import Task
 from tiengine.prepare import prepare
 from tiengine.recorder import Recorder
+from tiengine.result_files.checkpoint import Checkpoint
+from tiengine.result_files.layout import Block, TrainLabels
 from tiengine.scenario import Scenario
 from tiengine.start import equilibrium, release
 from tiengine.state import State

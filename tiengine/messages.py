@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from tiengine.checkpoint import Checkpoint
-from tiengine.events import Event
-from tiengine.groups import Block, TrainLabels
+from tiengine.result_files.checkpoint import Checkpoint
+from tiengine.result_files.events import Event
+from tiengine.result_files.layout import Block, TrainLabels
 
 __all__ = ["Advanced", "Begun", "Costs", "Ended", "Lost", "Message", "Paused", "Saved"]
 

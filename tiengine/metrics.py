@@ -14,7 +14,7 @@ from tiengine.parameters.errors import InputError
 from tiengine.ride import Ride
 
 if TYPE_CHECKING:
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
     from tiengine.scenario import Scenario
 
 __all__ = ["Metrics", "Spread", "TrainMetrics", "evaluate"]

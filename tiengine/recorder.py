@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.channels import MORTAR
 from tiengine.kernels import layout as at
+from tiengine.result_files.channels import MORTAR
+from tiengine.result_files.layout import DTYPES
+from tiengine.result_files.writer import Block, GroupSpec, TrainLabels, Writer
 from tiengine.scenario import Scenario
 from tiengine.stepper import Chunk
 from tiengine.train import TrainModel
-from tiengine.writer import DTYPES, Block, GroupSpec, TrainLabels, Writer
 
 __all__ = ["Recorder", "Samples"]
 

@@ -18,14 +18,14 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from tiengine.channels import GAUGE_FORCE, GAUGE_MOTION, GROUPS
 from tiengine.coach import Coach
 from tiengine.fastening import Fastening
 from tiengine.fields import NumberOr
-from tiengine.groups import GroupSpec
 from tiengine.mortar import Mortar
 from tiengine.parts import ProfilePoints
 from tiengine.rail import Rail
+from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION, GROUPS
+from tiengine.result_files.layout import GroupSpec
 from tiengine.scenario import Scenario
 from tiengine.slab import Slab
 from tiengine.vehicle import Vehicle

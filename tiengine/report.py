@@ -21,14 +21,14 @@ from tiengine.index import Index
 from tiengine.key_figures import key_figures, summarise
 from tiengine.metrics import Metrics
 from tiengine.metrics_table import notes
-from tiengine.output_file import check_output
 from tiengine.parameters.errors import InputError
-from tiengine.results import COMPLETE
+from tiengine.result_files.output_file import check_output
+from tiengine.result_files.reader import COMPLETE
+from tiengine.result_files.summary import summary
 from tiengine.scenario_words import scenario_words
-from tiengine.screen import summary
 
 if TYPE_CHECKING:
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["render", "write"]
 

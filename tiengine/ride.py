@@ -23,7 +23,7 @@ from tiengine.parameters.errors import InputError
 from tiengine.train import TrainModel, assemble, static_wheel_loads
 
 if TYPE_CHECKING:
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
     from tiengine.scenario import Scenario
     from tiengine.vehicle import Vehicle
 

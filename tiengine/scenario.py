@@ -17,7 +17,6 @@ from pydantic import Field
 
 from tiengine.defects import check_defects
 from tiengine.ensemble import Ensemble
-from tiengine.events import Events
 from tiengine.gauges import Gauge, check_gauges
 from tiengine.irregularity import IrregularityParams
 from tiengine.mortar import MortarVoid
@@ -27,6 +26,7 @@ from tiengine.parameters.input_files import load_toml, to_tuples, user_path
 from tiengine.parameters.presets import find_preset
 from tiengine.parameters.quantity import Params, PlainName, Source, build
 from tiengine.parts import Parts, build_parts, collect_presets
+from tiengine.result_files.events import Events
 from tiengine.sections import Contact, Numerics, Output, Track, Train
 
 __all__ = ["Scenario", "check_wavelength", "load_scenario", "to_toml"]

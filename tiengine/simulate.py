@@ -12,24 +12,24 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
 from tiengine.disk_space import check_space
 from tiengine.gather import Gathering, Progress, Tell
-from tiengine.groups import GroupSpec
 from tiengine.march import march, never
 from tiengine.messages import Message
-from tiengine.output_file import check_output
 from tiengine.parameters.errors import InputError, RunFailedError, RunStoppedError
 from tiengine.plan import Task, plan
 from tiengine.prepare import AUTO_STEPS, prepare
 from tiengine.recorder import Recorder
-from tiengine.results import Result
-from tiengine.results import open as open_result
+from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
+from tiengine.result_files.layout import GroupSpec
+from tiengine.result_files.output_file import check_output
+from tiengine.result_files.reader import Result
+from tiengine.result_files.reader import open as open_result
+from tiengine.result_files.writer import Writer
 from tiengine.scenario import Scenario, load_scenario, to_toml
 from tiengine.simulation import IMPORT_BEGAN
 from tiengine.trackside import trackside_groups
 from tiengine.worker import distribute
-from tiengine.writer import Writer
 
 IMPORT_SECONDS = time.perf_counter() - IMPORT_BEGAN
 

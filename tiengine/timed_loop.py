@@ -17,10 +17,10 @@ from tiengine.irregularity import Irregularity
 from tiengine.march import CHUNK_STEPS
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recorder import Recorder
+from tiengine.result_files.writer import Writer
 from tiengine.scenario import Scenario
 from tiengine.stepper import Stepper
 from tiengine.trackside import Trackside
-from tiengine.writer import Writer
 
 __all__ = ["REST", "StageTimers", "TimedLoop", "Times", "shown"]
 

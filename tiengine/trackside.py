@@ -14,17 +14,16 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.channels import DEFLECTION, GAUGE_FORCE, GAUGE_MOTION, SEATS, SLABS
 from tiengine.deflection import Deflection
 from tiengine.envelopes import SeatEnvelopes, SlabEnvelopes
 from tiengine.gauge_samples import gauge_samples
 from tiengine.gauges import Gauge, nearest_seat
-from tiengine.groups import Block, GroupSpec
 from tiengine.kernels import layout as at
+from tiengine.result_files.channels import DEFLECTION, GAUGE_FORCE, GAUGE_MOTION, SEATS, SLABS
+from tiengine.result_files.layout import DTYPES, Block, GroupSpec
 from tiengine.scenario import Scenario
 from tiengine.slab import Slab
 from tiengine.stepper import Stepper
-from tiengine.writer import DTYPES
 
 __all__ = ["Trackside", "Watcher", "trackside_groups"]
 

@@ -26,9 +26,9 @@ from typing import TYPE_CHECKING, cast
 from threadpoolctl import threadpool_limits
 
 if TYPE_CHECKING:
-    from tiengine.checkpoint import Checkpoint
     from tiengine.messages import Message
     from tiengine.plan import Task
+    from tiengine.result_files.checkpoint import Checkpoint
 
 __all__ = ["distribute"]
 

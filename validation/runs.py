@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.results import Result
+from tiengine.result_files.reader import Result
 from tiengine.scenario import load_scenario
 from tiengine.simulate import run
 from validation.msm.simulate import FullLength, run_full_length

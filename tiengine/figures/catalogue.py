@@ -11,7 +11,7 @@ from tiengine.parameters.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["COMPARE", "KINDS", "Kind", "kind_named", "names"]
 

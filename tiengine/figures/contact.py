@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tiengine.profile import Profile
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["draw"]
 

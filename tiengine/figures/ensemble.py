@@ -11,13 +11,13 @@ from tiengine.figures.curve import Band
 from tiengine.figures.palette import BLUE, GREY, SKY, VERMILION
 from tiengine.figures.source import AbsentError, Samples, Train
 from tiengine.figures.style import in_style, new_figure
-from tiengine.results import COMPLETE
+from tiengine.result_files.reader import COMPLETE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["draw"]
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from tiengine.figures.catalogue import COMPARE, KINDS, kind_named
 from tiengine.figures.source import AbsentError
 from tiengine.figures.style import check_suffix, save
-from tiengine.output_file import check_output
 from tiengine.parameters.errors import InputError
+from tiengine.result_files.output_file import check_output
 
 if TYPE_CHECKING:
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["draw_all", "draw_one"]
 

@@ -15,7 +15,7 @@ from tiengine.ride import Ride
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["draw"]
 

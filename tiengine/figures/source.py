@@ -16,7 +16,7 @@ from tiengine.parameters.input_files import parse_toml
 from tiengine.train import TrainModel, assemble, static_wheel_loads
 
 if TYPE_CHECKING:
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
     from tiengine.scenario import Scenario
 
 __all__ = ["AbsentError", "Samples", "Train"]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["draw", "passing_frequencies", "welch"]
 

@@ -19,14 +19,14 @@ from typing import Any
 
 import numpy as np
 
-from tiengine import results
-from tiengine.channels import DOFS
-from tiengine.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
-from tiengine.events import Event
-from tiengine.groups import Block, GroupSpec, TrainLabels
-from tiengine.journal import journal_of
 from tiengine.parameters.errors import InputError
-from tiengine.writer import Writer
+from tiengine.result_files import reader as results
+from tiengine.result_files.channels import DOFS
+from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
+from tiengine.result_files.events import Event
+from tiengine.result_files.journal import journal_of
+from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
+from tiengine.result_files.writer import Writer
 from validation.faults.contents import contents, litter, reads
 from validation.faults.dying import DIED, Call, at_call, in_copy
 
@@ -177,7 +177,7 @@ def states_of(session: Callable[[Path], None], folder: Path) -> tuple[list[str],
         session: Is carried out in a copy of this process.
         folder: Where.
     """
-    from tiengine import output_file
+    from tiengine.result_files import output_file
 
     file = folder / "calls.txt"
     commit, complete = output_file.OutputFile.commit, output_file.OutputFile.complete

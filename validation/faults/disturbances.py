@@ -9,8 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tiengine import results
 from tiengine.parameters.errors import InputError
+from tiengine.result_files import reader as results
 from validation.faults.contents import contents, reads, start_of
 from validation.faults.kills import NAME, Yard
 from validation.faults.launch import Process

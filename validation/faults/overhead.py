@@ -20,9 +20,9 @@ from tiengine.gather import COMMIT_SHARE, FLUSH_SECONDS, Gathering
 from tiengine.march import Run, _facts
 from tiengine.messages import Begun, Saved
 from tiengine.plan import plan
+from tiengine.result_files.writer import Writer
 from tiengine.scenario import load_scenario, to_toml
 from tiengine.simulate import CHECKPOINT_SECONDS, _groups
-from tiengine.writer import Writer
 
 __all__ = ["Overhead", "overhead"]
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tiengine import writer
+from tiengine.result_files import writer
 
 __all__ = ["Record", "read", "recorded"]
 

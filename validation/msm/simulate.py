@@ -15,11 +15,11 @@ from tiengine import backend
 from tiengine.irregularity import Irregularity, make_irregularity
 from tiengine.parameters.errors import InputError
 from tiengine.recorder import Recorder, Samples
-from tiengine.results import Result
+from tiengine.result_files.reader import Result
+from tiengine.result_files.writer import Writer
 from tiengine.scenario import Scenario, load_scenario, to_toml
 from tiengine.setup import ingredients
 from tiengine.simulate import Progress
-from tiengine.writer import Writer
 from validation.msm.model import FullTrack, build_track
 from validation.msm.start import steady_rolling
 from validation.msm.step import Buffers, FullState, FullStepper

@@ -102,7 +102,7 @@ def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
 
 def measure_outputs(rounds: int, distance: float) -> dict[str, Any]:
     """Time of a step of whole runs [us], over the interval of all outputs and over the channels of a wheel."""
-    from tiengine.channels import WHEEL
+    from tiengine.result_files.channels import WHEEL
     from tiengine.scenario import load_scenario
     from tiengine.simulate import run as simulate
 

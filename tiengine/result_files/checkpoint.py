@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.journal import atomic_write
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import LARGEST_CHECKPOINT, check_regular
+from tiengine.result_files.journal import atomic_write
 
 __all__ = ["Checkpoint", "checkpoint_path", "checkpoint_paths", "sealed"]
 

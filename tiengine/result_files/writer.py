@@ -31,23 +31,21 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.channels import Channel
-from tiengine.column import Column
-from tiengine.event_table import EVENTS, create_events, event_columns
-from tiengine.events import Event
-from tiengine.groups import CHUNK, Axis, Block, GroupSpec, TrainLabels
-from tiengine.output_file import DISK_ERRORS, OutputFile, header
 from tiengine.parameters.errors import InputError
-from tiengine.result_layout import unreadable
-from tiengine.results import Result
+from tiengine.result_files.channels import Channel
+from tiengine.result_files.damage import unreadable
+from tiengine.result_files.event_table import EVENTS, create_events, event_columns
+from tiengine.result_files.events import Event
+from tiengine.result_files.growing_dataset import Column
+from tiengine.result_files.layout import CHUNK, DTYPES, Axis, Block, GroupSpec, TrainLabels
+from tiengine.result_files.output_file import DISK_ERRORS, OutputFile, header
+from tiengine.result_files.reader import Result
 
-__all__ = ["DTYPES", "Block", "GroupSpec", "TrainLabels", "Writer"]
+__all__ = ["Block", "GroupSpec", "TrainLabels", "Writer"]
 
 Reals = NDArray[np.float64]
 
 CHECKED = {"fletcher32": True}  # a checksum with every chunk: a damaged number is found out, not taken for one
-
-DTYPES = {"single": np.float32, "double": np.float64}
 
 
 class Writer:

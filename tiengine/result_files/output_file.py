@@ -1,7 +1,7 @@
 """The life of a result file: created, locked, committed now and then, completed; or continued after a crash.
 
 The file has its name from its first commit on, so that it can be read while the run goes on, and what was committed
-survives whatever happens to the process (:mod:`tiengine.journal`). While it replaces an older file (``force``), it gets
+survives whatever happens to the process (:mod:`tiengine.result_files.journal`). While it replaces an older file (``force``), it gets
 its name only once it holds something.
 """
 
@@ -21,12 +21,12 @@ from typing import Any
 import h5py
 from filelock import FileLock
 
-from tiengine.checkpoint import checkpoint_paths
-from tiengine.file_lock import locked, release, sweep
-from tiengine.journal import JournalledFile, journal_of, recover, sync_folder
 from tiengine.parameters.errors import InputError
-from tiengine.results import COMPLETE, FORMAT, FORMAT_VERSION, RUNNING, Result
-from tiengine.results import open as open_result
+from tiengine.result_files.checkpoint import checkpoint_paths
+from tiengine.result_files.file_lock import locked, release, sweep
+from tiengine.result_files.journal import JournalledFile, journal_of, recover, sync_folder
+from tiengine.result_files.reader import COMPLETE, FORMAT, FORMAT_VERSION, RUNNING, Result
+from tiengine.result_files.reader import open as open_result
 
 __all__ = ["OutputFile", "check_output", "header"]
 

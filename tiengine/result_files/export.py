@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from tiengine.channel_table import ChannelTable, channel_table, chosen
-from tiengine.output_file import check_output
 from tiengine.parameters.errors import InputError
+from tiengine.result_files.channel_table import ChannelTable, channel_table, chosen
+from tiengine.result_files.output_file import check_output
 
 if TYPE_CHECKING:
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["export"]
 

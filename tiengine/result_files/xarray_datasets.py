@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import h5py
     import xarray
 
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["open_dataset", "stacked_dataset"]
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import h5py
 
-from tiengine.channels import Channel
-from tiengine.events import Event
+from tiengine.result_files.channels import Channel
+from tiengine.result_files.events import Event
 
 __all__ = ["EVENTS", "create_events", "event_columns"]
 

@@ -16,10 +16,10 @@ import h5py
 from numpy.typing import NDArray
 
 from tiengine.parameters.errors import InputError, nearest
-from tiengine.results import OPTIONAL
+from tiengine.result_files.reader import OPTIONAL
 
 if TYPE_CHECKING:
-    from tiengine.results import Result
+    from tiengine.result_files.reader import Result
 
 __all__ = ["ChannelTable", "Column", "channel_table", "chosen", "labels_of"]
 

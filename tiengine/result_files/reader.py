@@ -15,11 +15,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.file_lock import settle
-from tiengine.journal import journal_of
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.input_files import is_file, parse_toml
-from tiengine.result_layout import check_train, readable, unreadable
+from tiengine.result_files.damage import check_train, readable, unreadable
+from tiengine.result_files.file_lock import settle
+from tiengine.result_files.journal import journal_of
 
 if TYPE_CHECKING:
     import xarray
@@ -261,7 +261,10 @@ class Result:
         Raises:
             InputError: No such train or group, trains that cannot be stacked, or xarray is missing.
         """
-        from tiengine.datasets import open_dataset, stacked_dataset  # xarray takes a second to import
+        from tiengine.result_files.xarray_datasets import (  # xarray takes a second to import
+            open_dataset,
+            stacked_dataset,
+        )
 
         if train is None:
             return stacked_dataset(self, self._file, group)

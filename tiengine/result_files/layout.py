@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.channels import DIRECTIONS, DOFS, GROUPS, SIDES, Channel
+from tiengine.result_files.channels import DIRECTIONS, DOFS, GROUPS, SIDES, Channel
 
-__all__ = ["CHUNK", "SEAT", "SLAB", "TIME", "Axis", "Block", "GroupSpec", "TrainLabels"]
+__all__ = ["Axis", "Block", "CHUNK", "DTYPES", "GroupSpec", "SEAT", "SLAB", "TIME", "TrainLabels"]
 
 Reals = NDArray[np.float64]
 
@@ -129,7 +129,7 @@ class GroupSpec:
 
     @classmethod
     def standard(cls, group: str, names: Sequence[str], times_of: str | None = None) -> GroupSpec:
-        """Some channels of one of the groups of :mod:`tiengine.channels`."""
+        """Some channels of one of the groups of :mod:`tiengine.result_files.channels`."""
         axis = {"seats": SEAT, "slabs": SLAB}.get(group, TIME)
         chunk = 20 if group == "deflection" else CHUNK  # a sample has hundreds of points, and is rare
         return cls(DIMENSIONS[group], {name: GROUPS[group][name] for name in names}, times_of, axis, chunk)
@@ -148,3 +148,6 @@ class Block:
     along: NDArray[Any]
     place: Reals
     channels: Mapping[str, NDArray[Any]]
+
+
+DTYPES = {"single": np.float32, "double": np.float64}

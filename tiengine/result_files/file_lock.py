@@ -13,8 +13,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from tiengine.journal import journal_of, recover
 from tiengine.parameters.errors import InputError
+from tiengine.result_files.journal import journal_of, recover
 
 __all__ = ["locked", "release", "settle", "sweep"]
 

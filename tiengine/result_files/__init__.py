@@ -1,0 +1,1 @@
+"""Result files: their layout, writing and reading, journal, checkpoints, exports."""
