@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine.conicity import equivalent_conicity, rolling_radius_difference, wheelset_position
-from tiengine.contact_geometry import ContactSettings, WheelRailPair
-from tiengine.profile import Profile, load_profile
+from tiengine.contact.conicity import equivalent_conicity, rolling_radius_difference, wheelset_position
+from tiengine.contact.profile import Profile, load_profile
+from tiengine.contact.table import ContactSettings, WheelRailPair
 
 EUROPE = {"gauge_depth": 0.014, "half_spacing": 0.75, "wheel_radius": 0.46}
 

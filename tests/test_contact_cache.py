@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tiengine import contact_cache
-from tiengine.contact_cache import contact_table
-from tiengine.contact_geometry import ContactSettings, build_contact_table
-from tiengine.profile import load_profile
+from tiengine.contact import table_cache as contact_cache
+from tiengine.contact.profile import load_profile
+from tiengine.contact.table import ContactSettings, build_contact_table
+from tiengine.contact.table_cache import contact_table
 
 COARSE = ContactSettings(du=5e-5, dalpha=2e-3, smoothing=0.0)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine.contact_geometry import ContactSettings, ContactTable, WheelRailPair, build_contact_table
-from tiengine.contact_search import find_contacts
+from tiengine.contact.profile import Profile, load_profile
+from tiengine.contact.search import find_contacts
+from tiengine.contact.table import ContactSettings, ContactTable, WheelRailPair, build_contact_table
 from tiengine.parameters.errors import InputError
-from tiengine.profile import Profile, load_profile
 
 DRAWN = 1e-8  # m: arcs printed to 1e-5 mm, points to 1e-6 mm, five such numbers in a gap
 NAMES = list(ContactTable.COLUMNS)

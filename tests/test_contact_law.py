@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tiengine.hertz import hertz
+from tiengine.contact.hertz import hertz
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
 from tiengine.model import Model

@@ -11,10 +11,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tiengine.cli import main
-from tiengine.conicity import equivalent_conicity, rolling_radius_difference
-from tiengine.contact_geometry import ContactSettings, WheelRailPair
+from tiengine.contact.conicity import equivalent_conicity, rolling_radius_difference
+from tiengine.contact.profile import load_profile
+from tiengine.contact.table import ContactSettings, WheelRailPair
 from tiengine.contact_report import contact_report, draw
-from tiengine.profile import load_profile
 
 PRINTED = 0.0350
 """LMA on CHN60 at 3 mm, another program's digits (tests/test_conicity.py)."""

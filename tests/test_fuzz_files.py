@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
+from tiengine.contact.profile import Kind, Profile, load_profile
 from tiengine.irregularity import IrregularityParams, make_irregularity
-from tiengine.profile import Kind, Profile, load_profile
 from tiengine.track_files import LARGEST_CHAINAGE, LARGEST_HEIGHT, read_series
 
 from .fuzzing import DAMAGES, EXAMPLES, Damage, mutated_texts, on_many, refused

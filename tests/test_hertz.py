@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine.hertz import hertz, zhai_G
+from tiengine.contact.hertz import hertz, zhai_G
 
 E, NU = 2.06e11, 0.3
 NEWTON = 70e3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine.kalker import asymptote_mismatch, kalker
+from tiengine.contact.kalker import asymptote_mismatch, kalker
 
 EXACT = 1e-12  # interpolation at its own nodes
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine.contact_cache import contact_table
+from tiengine.contact.table_cache import contact_table
 from tiengine.p2 import contact_stiffness, p2_frequency, p2_of
 from tiengine.scenario import load_scenario
 from tiengine.setup import contact_settings

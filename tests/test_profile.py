@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tiengine.contact.profile import Profile, load_profile, profile_names
 from tiengine.parameters.errors import InputError
-from tiengine.profile import Profile, load_profile, profile_names
 
 ROUNDING = 0.5e-9  # of the library's lists, 1e-6 mm
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tiengine.contact_geometry import ContactSettings, WheelRailPair
+from tiengine.contact.profile import Profile, load_profile
+from tiengine.contact.table import ContactSettings, WheelRailPair
 from tiengine.parameters.errors import InputError
-from tiengine.profile import Profile, load_profile
 from tiengine.scenario import load_scenario
 
 DATA = Path(__file__).parent / "data"

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tiengine.contact.profile import load_profile
 from tiengine.defects import FailedFastenings, MortarDefect, fastening_factors
 from tiengine.overrides import parse_value
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import KINDS, find_preset, preset_names, preset_source
-from tiengine.profile import load_profile
 from tiengine.scenario import check_wavelength, load_scenario, to_toml
 from tiengine.vehicle import load_vehicle
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tiengine.contact_geometry import ContactTable
+from tiengine.contact.table import ContactTable
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
 from tiengine.model import Model

@@ -119,10 +119,10 @@ def contact(
     **placement: float,
 ) -> None:
     """Show how WHEEL and RAIL, presets or files, touch: rolling radii, conicity, points of contact."""
-    from tiengine.contact_geometry import ContactSettings
+    from tiengine.contact.profile import ROUNDING_LENGTH, load_profile
+    from tiengine.contact.table import ContactSettings
     from tiengine.contact_report import contact_report, draw
     from tiengine.parameters.quantity import build
-    from tiengine.profile import ROUNDING_LENGTH, load_profile
     from tiengine.result_files.output_file import check_output
 
     length = ROUNDING_LENGTH if smoothing is None else smoothing

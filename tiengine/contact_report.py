@@ -1,6 +1,6 @@
 """What ``tiengine contact`` shows of a wheel on a rail: rolling-radius difference, conicity, points of contact.
 
-The wheelset is shifted sideways on straight track, its roll follows (:mod:`tiengine.conicity`). Conicity is that of
+The wheelset is shifted sideways on straight track, its roll follows (:mod:`tiengine.contact.conicity`). Conicity is that of
 harmonic linearisation; what EN 15302 gets by integrating the motion is compared in ``docs/files.md``.
 """
 
@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.conicity import equivalent_conicity, wheelset_position
-from tiengine.contact_geometry import ContactSettings, WheelRailPair
+from tiengine.contact.conicity import equivalent_conicity, wheelset_position
+from tiengine.contact.profile import Profile
+from tiengine.contact.table import ContactSettings, WheelRailPair
 from tiengine.figures.palette import BLUE, GREEN, ORANGE, VERMILION
 from tiengine.parameters.errors import InputError
-from tiengine.profile import Profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.contact_geometry import ContactTable
+from tiengine.contact.table import ContactTable
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import SHIFT
 from tiengine.result_files.channels import DOFS, SIDES

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from tiengine.blocks import Blocks
-from tiengine.contact_geometry import ContactTable
+from tiengine.contact.table import ContactTable
 from tiengine.fastening import Fastening, seat_count, seat_tables
 from tiengine.integrator import Newmark, inverse, seat_inverse_terms, seat_shapes, smearing
 from tiengine.irregularity import HALF_BASE

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tiengine.contact_geometry import SMALLEST_CURVATURE, ContactSettings, WheelRailPair
-from tiengine.contact_search import transverse_curvature
-from tiengine.hertz import hertz, zhai_G
+from tiengine.contact.hertz import hertz, zhai_G
+from tiengine.contact.search import transverse_curvature
+from tiengine.contact.table import SMALLEST_CURVATURE, ContactSettings, WheelRailPair
 from tiengine.train import assemble, static_wheel_loads
 
 if TYPE_CHECKING:

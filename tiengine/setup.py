@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.contact_cache import contact_table
-from tiengine.contact_geometry import ContactSettings
+from tiengine.contact.table import ContactSettings
+from tiengine.contact.table_cache import contact_table
 from tiengine.defects import fastening_factors
 from tiengine.integrator import Newmark
 from tiengine.model import Ingredients, SlabDesigns

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.conicity import equivalent_conicity, rolling_radius_difference, wheelset_position
-from tiengine.contact_geometry import ContactSettings, WheelRailPair
-from tiengine.profile import load_profile
+from tiengine.contact.conicity import equivalent_conicity, rolling_radius_difference, wheelset_position
+from tiengine.contact.profile import load_profile
+from tiengine.contact.table import ContactSettings, WheelRailPair
 from validation.case import Case
 
 __all__ = ["CASES", "draw"]

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.contact_geometry import WheelRailPair
+from tiengine.contact.table import WheelRailPair
 from tiengine.parameters.errors import RunFailedError
 from tiengine.scenario import Scenario, load_scenario
 from tiengine.setup import ingredients

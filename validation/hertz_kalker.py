@@ -15,9 +15,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.contact_search import transverse_curvature
-from tiengine.hertz import hertz, zhai_G
-from tiengine.kalker import kalker
+from tiengine.contact.hertz import hertz, zhai_G
+from tiengine.contact.kalker import kalker
+from tiengine.contact.search import transverse_curvature
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
 from tiengine.start import evaluate_contact

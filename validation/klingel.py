@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from tiengine.contact_geometry import WheelRailPair
+from tiengine.contact.table import WheelRailPair
 from tiengine.scenario import Scenario, load_scenario
 from tiengine.setup import ingredients
 from tiengine.simulate import run

@@ -29,10 +29,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.contact_geometry import ContactSettings, WheelRailPair
-from tiengine.contact_search import transverse_curvature
-from tiengine.hertz import hertz
-from tiengine.profile import Profile, load_profile
+from tiengine.contact.hertz import hertz
+from tiengine.contact.profile import Profile, load_profile
+from tiengine.contact.search import transverse_curvature
+from tiengine.contact.table import ContactSettings, WheelRailPair
 from validation.case import Case
 
 __all__ = ["CASES", "R0", "RAIL", "REFERENCE", "WHEEL", "approach", "located", "radius"]

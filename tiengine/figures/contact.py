@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.profile import Profile
+    from tiengine.contact.profile import Profile
     from tiengine.result_files.reader import Result
 
 __all__ = ["draw"]

@@ -26,8 +26,8 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from tiengine.conicity import wheelset_position
-from tiengine.contact_geometry import ContactTable, WheelRailPair
+from tiengine.contact.conicity import wheelset_position
+from tiengine.contact.table import ContactTable, WheelRailPair
 from tiengine.train import TrainModel
 
 __all__ = ["EquivalentContact", "critical_speed", "equivalent_contact", "fastest_growth"]

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.contact_geometry import ContactTable
+from tiengine.contact.table import ContactTable
 from tiengine.fastening import Fastening
 from tiengine.integrator import Newmark
 from tiengine.irregularity import HALF_BASE

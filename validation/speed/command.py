@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from tiengine import contact_cache
+from tiengine.contact import table_cache as contact_cache
 from tiengine.result_files import reader as results
 from validation.speed.effort import Effort
 from validation.speed.findings import Findings

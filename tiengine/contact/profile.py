@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
+from tiengine.contact.profile_files import read_profile
+from tiengine.contact.profile_frame import FEWEST_POINTS, Kind, increasing_run, placed, smoothing_curve
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import is_file
-from tiengine.profile_files import read_profile
-from tiengine.profile_frame import FEWEST_POINTS, Kind, increasing_run, placed, smoothing_curve
 
 __all__ = ["Kind", "Profile", "load_profile", "profile_names"]
 
@@ -188,7 +188,7 @@ def load_profile(
     mirror: bool | None = None,
     tape_circle: float = 0.0,
 ) -> Profile:
-    """A profile of the library, or one read from a file (formats: :mod:`tiengine.profile_files`).
+    """A profile of the library, or one read from a file (formats: :mod:`tiengine.contact.profile_files`).
 
     Args:
         name_or_path: Name of a preset (``"LMA"``, ``"S1002"``, ``"CHN60"``, ``"60E1"``) or path of a file.

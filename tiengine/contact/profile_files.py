@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.contact.profile_frame import FEWEST_POINTS, Kind, PointList, check_kinks, oriented
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import LARGEST_PROFILE, numbers_of, read_text_file
-from tiengine.profile_frame import FEWEST_POINTS, Kind, PointList, check_kinks, oriented
 
 __all__ = ["FORMATS", "MOST_POINTS", "read_profile"]
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tiengine.contact_geometry import WheelRailPair
-from tiengine.contact_search import Contacts
+from tiengine.contact.search import Contacts
+from tiengine.contact.table import WheelRailPair
 
 __all__ = ["WheelsetPosition", "equivalent_conicity", "rolling_radius_difference", "wheelset_position"]
 

@@ -18,9 +18,11 @@ import numpy as np
 import scipy
 from platformdirs import user_cache_path
 
-from tiengine import contact_geometry, contact_search, hertz, kalker, profile, profile_frame
-from tiengine.contact_geometry import ContactSettings, ContactTable, build_contact_table
-from tiengine.profile import Profile
+from tiengine.contact import hertz, kalker, profile, profile_frame
+from tiengine.contact import search as contact_search
+from tiengine.contact import table as contact_geometry
+from tiengine.contact.profile import Profile
+from tiengine.contact.table import ContactSettings, ContactTable, build_contact_table
 
 __all__ = ["contact_table"]
 
@@ -39,7 +41,7 @@ def contact_table(wheel: Profile, rail: Profile, settings: ContactSettings) -> C
         settings: Placement, material, range and smoothing.
 
     Returns:
-        The bits of :func:`tiengine.contact_geometry.build_contact_table`.
+        The bits of :func:`tiengine.contact.table.build_contact_table`.
 
     Raises:
         InputError: As there.

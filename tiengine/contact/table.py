@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import correlate1d
 
-from tiengine.contact_search import Contacts, find_contacts, transverse_curvature
-from tiengine.hertz import hertz, zhai_G
-from tiengine.kalker import kalker
+from tiengine.contact.hertz import hertz, zhai_G
+from tiengine.contact.kalker import kalker
+from tiengine.contact.profile import Profile
+from tiengine.contact.search import Contacts, find_contacts, transverse_curvature
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
-from tiengine.profile import Profile
 
 __all__ = ["ContactSettings", "ContactTable", "WheelRailPair", "build_contact_table"]
 

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tiengine.contact.profile import Profile
 from tiengine.parameters.errors import InputError
-from tiengine.profile import Profile
 
 __all__ = ["Contacts", "find_contacts", "transverse_curvature"]
 

@@ -1,0 +1,1 @@
+"""Contact of wheel and rail: profiles, geometry tables, Hertz and Kalker."""
