@@ -13,7 +13,7 @@ from tiengine.result_files import reader as results
 from tiengine.result_files.damage import LAYOUT
 from tiengine.result_files.reader import FORMAT, FORMAT_VERSION, Result
 from tiengine.scenario import Scenario, load_scenario, to_toml
-from tiengine.train import assemble, static_wheel_loads
+from tiengine.vehicle.train import assemble, static_wheel_loads
 
 V = 350.0 / 3.6  # m/s
 BODIES = ("car", "frame 1", "frame 2", "wheelset 1", "wheelset 2", "wheelset 3", "wheelset 4")

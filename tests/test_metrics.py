@@ -20,7 +20,7 @@ from tiengine.result_files.channels import WHEEL
 from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
 from tiengine.ride import Ride
 from tiengine.scenario import Scenario, load_scenario, to_toml
-from tiengine.train import assemble, static_wheel_loads
+from tiengine.vehicle.train import assemble, static_wheel_loads
 
 SPEED = 97.0  # m/s, as written
 BODIES = ("car", "frame 1", "frame 2", "wheelset 1", "wheelset 2", "wheelset 3", "wheelset 4")

@@ -16,7 +16,7 @@ from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import KINDS, find_preset, preset_names, preset_source
 from tiengine.scenario import check_wavelength, load_scenario, to_toml
-from tiengine.vehicle import load_vehicle
+from tiengine.vehicle.vehicle import load_vehicle
 
 TRAIN = {"vehicles": ["CRH380A_v2"], "speed_kmh": 300.0, "distance": 100.0}
 

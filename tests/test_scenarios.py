@@ -10,7 +10,7 @@ from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
 from tiengine.scenario import load_scenario
 from tiengine.stability import TOLERATED_GROWTH, energy_growth
-from tiengine.train import static_wheel_loads
+from tiengine.vehicle.train import static_wheel_loads
 
 from .reference.marching import KMH, march, model_of, scenario
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tiengine.parameters.errors import InputError
-from tiengine.speed import SpeedProfile
+from tiengine.vehicle.speed_programme import SpeedProfile
 
 BRAKING = SpeedProfile.table([0.0, 200.0, 350.0, 600.0], [97.2, 90.0, 92.0, 80.0])
 

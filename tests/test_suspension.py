@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from tiengine.kernels.suspension import suspension_forces
-from tiengine.train import TrainModel, assemble
-from tiengine.vehicle import load_vehicle
+from tiengine.vehicle.train import TrainModel, assemble
+from tiengine.vehicle.vehicle import load_vehicle
 
 ROUNDING = np.finfo(float).eps
 NAMES = ("CRH380A_v2", "CRH380A_v6", "Zhai_coach", "Manchester")

@@ -10,8 +10,8 @@ from scipy.linalg import block_diag, expm
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset
-from tiengine.train import assemble, static_wheel_loads, train_centres
-from tiengine.vehicle import load_vehicle
+from tiengine.vehicle.train import assemble, static_wheel_loads, train_centres
+from tiengine.vehicle.vehicle import load_vehicle
 
 from .reference.vehicles import NAMES, changed, free_of_wheelsets, rigid_motion, tiny_vehicle
 

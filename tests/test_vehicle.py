@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh, expm
 
-from tiengine.coach import Coach, expand
-from tiengine.connector import Body, Damper, Spring, Stop, end_motion, prolonged
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset, preset_source
 from tiengine.parameters.quantity import build
-from tiengine.train import assemble, static_wheel_loads
-from tiengine.vehicle import load_vehicle, vehicle_from_table, vehicle_names
+from tiengine.vehicle.coach import Coach, expand
+from tiengine.vehicle.connector import Body, Damper, Spring, Stop, end_motion, prolonged
+from tiengine.vehicle.train import assemble, static_wheel_loads
+from tiengine.vehicle.vehicle import load_vehicle, vehicle_from_table, vehicle_names
 
 from .reference.vehicles import NAMES, changed, free_of_wheelsets, rigid_motion, tiny_vehicle
 

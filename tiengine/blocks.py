@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tiengine.fastening import Fastening
 from tiengine.integrator import Newmark, inverse, rail_inverses
 from tiengine.rail import RailWindow
-from tiengine.train import TrainModel
+from tiengine.vehicle.train import TrainModel
 
 __all__ = ["Blocks"]
 

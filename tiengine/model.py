@@ -23,7 +23,7 @@ from tiengine.kernels import layout as at
 from tiengine.mortar import Mortar
 from tiengine.rail import Rail, RailWindow, sine_products
 from tiengine.slab import Slab, SlabMatrices
-from tiengine.train import TrainModel, static_wheel_loads
+from tiengine.vehicle.train import TrainModel, static_wheel_loads
 
 __all__ = ["Ingredients", "Model", "SlabDesigns", "build_model"]
 

@@ -21,7 +21,7 @@ import numpy as np
 from tiengine.contact.hertz import hertz, zhai_G
 from tiengine.contact.search import transverse_curvature
 from tiengine.contact.table import SMALLEST_CURVATURE, ContactSettings, WheelRailPair
-from tiengine.train import assemble, static_wheel_loads
+from tiengine.vehicle.train import assemble, static_wheel_loads
 
 if TYPE_CHECKING:
     from tiengine.parts import Parts

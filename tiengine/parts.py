@@ -28,7 +28,7 @@ from tiengine.parameters.presets import KINDS, LONGEST_PATH, find_preset
 from tiengine.parameters.quantity import Name, Params, Q, Source, build
 from tiengine.rail import Rail
 from tiengine.slab import Slab
-from tiengine.vehicle import Vehicle, vehicle_from_table
+from tiengine.vehicle.vehicle import Vehicle, vehicle_from_table
 
 if TYPE_CHECKING:
     from tiengine.sections import Track, Train

@@ -14,7 +14,7 @@ from tiengine.result_files.layout import DTYPES
 from tiengine.result_files.writer import Block, GroupSpec, TrainLabels, Writer
 from tiengine.scenario import Scenario
 from tiengine.stepper import Chunk
-from tiengine.train import TrainModel
+from tiengine.vehicle.train import TrainModel
 
 __all__ = ["Recorder", "Samples"]
 

@@ -18,7 +18,6 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from tiengine.coach import Coach
 from tiengine.fastening import Fastening
 from tiengine.fields import NumberOr
 from tiengine.mortar import Mortar
@@ -28,7 +27,8 @@ from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION, GROUPS
 from tiengine.result_files.layout import GroupSpec
 from tiengine.scenario import Scenario
 from tiengine.slab import Slab
-from tiengine.vehicle import Vehicle
+from tiengine.vehicle.coach import Coach
+from tiengine.vehicle.vehicle import Vehicle
 
 __all__ = ["Table", "channel_tables", "page", "tables", "with_channels"]
 

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from tiengine.filters import low_pass
 from tiengine.parameters.errors import InputError
-from tiengine.train import TrainModel, assemble, static_wheel_loads
+from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Result
     from tiengine.scenario import Scenario
-    from tiengine.vehicle import Vehicle
+    from tiengine.vehicle.vehicle import Vehicle
 
 __all__ = ["FORCE_CUT_OFF", "FloorPoint", "Forces", "Ride"]
 

@@ -14,7 +14,7 @@ from tiengine.fields import channel_names, check_speed, number_or
 from tiengine.parameters.quantity import Params, Q
 from tiengine.parts import Part
 from tiengine.result_files.channels import BODY, IRREGULARITY, WHEEL
-from tiengine.speed import SpeedProfile
+from tiengine.vehicle.speed_programme import SpeedProfile
 
 __all__ = ["Contact", "Numerics", "Output", "Track", "Train"]
 

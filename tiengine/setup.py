@@ -15,7 +15,7 @@ from tiengine.model import Ingredients, SlabDesigns
 from tiengine.parameters.errors import InputError
 from tiengine.scenario import Scenario
 from tiengine.slab import slab_designs
-from tiengine.train import TrainModel, assemble
+from tiengine.vehicle.train import TrainModel, assemble
 
 __all__ = ["contact_settings", "ingredients"]
 

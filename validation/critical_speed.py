@@ -31,7 +31,7 @@ from tiengine.parameters.errors import RunFailedError
 from tiengine.scenario import Scenario, load_scenario
 from tiengine.setup import ingredients
 from tiengine.simulate import run
-from tiengine.train import TrainModel, static_wheel_loads
+from tiengine.vehicle.train import TrainModel, static_wheel_loads
 from validation.case import Case
 from validation.closed_forms.linear_vehicle import EquivalentContact, equivalent_contact, fastest_growth
 from validation.closed_forms.linear_vehicle import critical_speed as linear_critical_speed

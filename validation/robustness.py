@@ -14,7 +14,7 @@ from scipy.integrate import quad
 
 from tiengine.scenario import load_scenario
 from tiengine.stability import TOLERATED_GROWTH, energy_growth
-from tiengine.train import static_wheel_loads
+from tiengine.vehicle.train import static_wheel_loads
 from validation.case import Case
 from validation.models import paper_model
 from validation.runs import simulate

@@ -16,7 +16,7 @@ from tiengine.kernels import layout as at
 from tiengine.start import equilibrium
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper
-from tiengine.train import static_wheel_loads
+from tiengine.vehicle.train import static_wheel_loads
 from validation.case import Case
 from validation.models import paper_model
 from validation.runs import Forces, simulate

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh, expm
 
-from tiengine.train import TrainModel, assemble, static_wheel_loads
-from tiengine.vehicle import load_vehicle
+from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
+from tiengine.vehicle.vehicle import load_vehicle
 from validation.case import Case
 
 Reals = NDArray[np.float64]

@@ -24,7 +24,7 @@ from tiengine import backend
 from tiengine.scenario import load_scenario
 from tiengine.setup import ingredients
 from tiengine.simulate import run
-from tiengine.train import assemble, static_wheel_loads
+from tiengine.vehicle.train import assemble, static_wheel_loads
 from validation.case import Case
 from validation.closed_forms.two_mass import (
     WheelOnTrack,

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset
-from tiengine.train import TrainModel
-from tiengine.vehicle import Vehicle, vehicle_from_table
+from tiengine.vehicle.train import TrainModel
+from tiengine.vehicle.vehicle import Vehicle, vehicle_from_table
 
 NAMES = ("CRH2", "CRH380A_v2", "CRH380A_v6", "Manchester", "Zhai_coach")
 """Vehicles of the library."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tiengine.filters import low_pass
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import parse_toml
-from tiengine.train import TrainModel, assemble, static_wheel_loads
+from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Result

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from tiengine.contact.conicity import wheelset_position
 from tiengine.contact.table import ContactTable, WheelRailPair
-from tiengine.train import TrainModel
+from tiengine.vehicle.train import TrainModel
 
 __all__ = ["EquivalentContact", "critical_speed", "equivalent_contact", "fastest_growth"]
 

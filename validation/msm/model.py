@@ -31,7 +31,7 @@ from tiengine.mortar import Mortar
 from tiengine.parameters.errors import InputError
 from tiengine.rail import Rail
 from tiengine.scenario import Scenario
-from tiengine.train import TrainModel, static_wheel_loads
+from tiengine.vehicle.train import TrainModel, static_wheel_loads
 from validation.msm.plate import ModalSlab, modal_slab
 from validation.msm.seats import SeatTransform
 

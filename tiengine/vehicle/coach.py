@@ -12,7 +12,8 @@ from typing import Annotated, Any
 
 from pydantic import model_validator
 
-from tiengine.connector import (
+from tiengine.parameters.quantity import Name, Params, Q, Source
+from tiengine.vehicle.connector import (
     Body,
     Damper,
     Damping,
@@ -25,7 +26,6 @@ from tiengine.connector import (
     check_damper,
     check_stop,
 )
-from tiengine.parameters.quantity import Name, Params, Q, Source
 
 __all__ = ["Coach", "expand"]
 
@@ -270,7 +270,7 @@ def expand(coach: Coach) -> dict[str, Any]:
         coach: The compact form.
 
     Returns:
-        Fields of :class:`tiengine.vehicle.Vehicle`.
+        Fields of :class:`tiengine.vehicle.vehicle.Vehicle`.
     """
     geometry = coach.geometry
     parts = [*_axle_box_parts(coach), *_bogie_parts(coach)]

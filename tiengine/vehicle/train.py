@@ -2,7 +2,7 @@
 
 Coordinates: five a body (y, z, roll, pitch, yaw), body after body, vehicle after vehicle; then the internal
 states of dampers in series with springs, if asked for. How connectors and the change of speed enter is told
-in :mod:`tiengine.assembly`.
+in :mod:`tiengine.vehicle.assembly`.
 
 Gyroscopic pair of a wheelset with spin -V/r0: roll moment -J V/r0 yaw', yaw moment +J V/r0 roll'; on the
 left-hand side V C_speed, skew. Products of perturbations (pitch' yaw', pitch' roll') are dropped.
@@ -22,10 +22,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.assembly import Assembly, Element, Placed, longitudinal_push, spin_push
-from tiengine.connector import prolonged
 from tiengine.parameters.errors import InputError
-from tiengine.vehicle import Vehicle
+from tiengine.vehicle.assembly import Assembly, Element, Placed, longitudinal_push, spin_push
+from tiengine.vehicle.connector import prolonged
+from tiengine.vehicle.vehicle import Vehicle
 
 __all__ = ["GRAVITY", "MOTIONS", "TrainModel", "assemble", "static_wheel_loads", "train_centres"]
 

@@ -1,6 +1,6 @@
 """The equations of a train with the bodies' longitudinal motion still in them (MODEL §4).
 
-Every body has six motions here (x, y, z, roll, pitch, yaw); :mod:`tiengine.train` strikes out x. Each
+Every body has six motions here (x, y, z, roll, pitch, yaw); :mod:`tiengine.vehicle.train` strikes out x. Each
 connector contributes B' k B and B' c B with B its elongation by the motions. A damper's initial slope and a
 stop's stand in C and K; the kernel of :mod:`tiengine.kernels.suspension` adds the deviation of its table from
 that slope.
@@ -27,9 +27,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.connector import Body, Damper, Direction, Joint, Spring, end_motion
 from tiengine.parameters.errors import InputError
-from tiengine.vehicle import Vehicle
+from tiengine.vehicle.connector import Body, Damper, Direction, Joint, Spring, end_motion
+from tiengine.vehicle.vehicle import Vehicle
 
 __all__ = ["Assembly", "Element", "Placed", "longitudinal_push", "spin_push"]
 

@@ -1,7 +1,7 @@
 """Vehicles: validated parameters, and reading them from presets or files (MODEL §4).
 
 A vehicle is data: bodies, springs, dampers and stops. A file may give them one by one (``[[body]]``,
-``[[spring]]``, ``[[damper]]``, ``[[stop]]``), or as a coach on two bogies (:mod:`tiengine.coach`), or as a
+``[[spring]]``, ``[[damper]]``, ``[[stop]]``), or as a coach on two bogies (:mod:`tiengine.vehicle.coach`), or as a
 coach with such extras.
 """
 
@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from tiengine.coach import Coach, expand
-from tiengine.connector import Body, Damper, SeriesSprings, Spring, Stop
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.input_files import load_toml, to_tuples
 from tiengine.parameters.presets import find_preset, preset_names
 from tiengine.parameters.quantity import Name, Params, Q, Source, build
+from tiengine.vehicle.coach import Coach, expand
+from tiengine.vehicle.connector import Body, Damper, SeriesSprings, Spring, Stop
 
 __all__ = ["Vehicle", "load_vehicle", "vehicle_from_table", "vehicle_names"]
 

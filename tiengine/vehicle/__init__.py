@@ -1,0 +1,1 @@
+"""Vehicles and trains: bodies, connectors, speed over chainage."""
