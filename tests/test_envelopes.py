@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from tiengine.envelopes import SeatEnvelopes, SlabEnvelopes, watched_seats
 from tiengine.kernels import layout as at
 from tiengine.scenario import load_scenario
-from tiengine.slab_moments import moment_operator
 from tiengine.stepper import Stepper
+from tiengine.track.plate_shapes import moment_operator
 
 from .models import V350, Run, paper_model
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tiengine.fastening import seat_count, seat_tables
 from tiengine.kernels import layout as at
 from tiengine.model import Model
 from tiengine.state import State, positions
+from tiengine.track.fastening import seat_count, seat_tables
 
 from .explicit import Explicit
 from .models import V350, paper_model

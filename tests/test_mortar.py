@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from tiengine.kernels import mortar as kernel
-from tiengine.mortar import GAUSS, Mortar, MortarVoid, bed_factors
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import build
-from tiengine.slab import Slab, SlabMatrices, load_slab, slab_designs
+from tiengine.track.mortar import GAUSS, Mortar, MortarVoid, bed_factors
+from tiengine.track.slab import Slab, load_slab
+from tiengine.track.slab_matrices import SlabMatrices, slab_designs
 
 ROUNDING = np.finfo(float).eps
 TRAINS, SLABS, LEAD = 2, 3, 5  # LEAD columns of a train belong to something else

@@ -5,11 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tiengine.mortar import MortarVoid
 from tiengine.parameters.errors import InputError
 from tiengine.scenario import load_scenario
 from tiengine.simulate import run
-from tiengine.slab import load_slab, slab_matrices
+from tiengine.track.mortar import MortarVoid
+from tiengine.track.slab import load_slab
+from tiengine.track.slab_matrices import slab_matrices
 from validation.msm.plate import _Mesh, _plate, modal_slab
 from validation.msm.seats import SeatTransform
 from validation.msm.simulate import FullLength, run_full_length

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from tiengine.contact.profile import load_profile
-from tiengine.defects import FailedFastenings, MortarDefect, fastening_factors
 from tiengine.overrides import parse_value
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import KINDS, find_preset, preset_names, preset_source
 from tiengine.scenario import check_wavelength, load_scenario, to_toml
+from tiengine.track.defects import FailedFastenings, MortarDefect, fastening_factors
 from tiengine.vehicle.vehicle import load_vehicle
 
 TRAIN = {"vehicles": ["CRH380A_v2"], "speed_kmh": 300.0, "distance": 100.0}

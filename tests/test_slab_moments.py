@@ -7,10 +7,10 @@ import pytest
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from tiengine.mortar import Mortar
-from tiengine.plate_shapes import W, element_dofs, shapes_at, tabulate_shapes
-from tiengine.slab import Slab, load_slab, slab_matrices
-from tiengine.slab_moments import GAUSS_POINTS, moment_operator
+from tiengine.track.mortar import Mortar
+from tiengine.track.plate_shapes import GAUSS_POINTS, W, element_dofs, moment_operator, shapes_at, tabulate_shapes
+from tiengine.track.slab import Slab, load_slab
+from tiengine.track.slab_matrices import slab_matrices
 
 CORNERS = np.array([[x, y] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
 

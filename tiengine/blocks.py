@@ -8,9 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from tiengine.fastening import Fastening
 from tiengine.integrator import Newmark, inverse, rail_inverses
-from tiengine.rail import RailWindow
+from tiengine.track.fastening import Fastening
+from tiengine.track.rail import RailWindow
 from tiengine.vehicle.train import TrainModel
 
 __all__ = ["Blocks"]

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
-from tiengine.plate_shapes import W, element_dofs, locate, tabulate_shapes
 from tiengine.result_files.layout import Block
-from tiengine.slab import Slab
 from tiengine.stepper import Stepper
+from tiengine.track.plate_shapes import W, element_dofs, locate, tabulate_shapes
+from tiengine.track.slab import Slab
 
 __all__ = ["Deflection", "window_points"]
 

@@ -17,10 +17,10 @@ from tiengine.kernels import layout as at
 from tiengine.model import Model
 from tiengine.result_files.layout import Block
 from tiengine.scenario import Scenario
-from tiengine.slab_moments import moment_operator
 from tiengine.slot_extremes import SlotExtremes
 from tiengine.state import State
 from tiengine.stepper import Stepper
+from tiengine.track.plate_shapes import moment_operator
 
 __all__ = ["SeatEnvelopes", "SlabEnvelopes", "watched_seats"]
 
@@ -139,7 +139,7 @@ class SlabEnvelopes:
     Attributes:
         stepper: What is watched.
         void: Smallest factor of the voids under each slab that has one.
-        shape: Deflection at the nodes and under the seats, moments at the points of :mod:`tiengine.slab_moments`.
+        shape: Deflection at the nodes and under the seats, moments at the points of :mod:`tiengine.track.slab_moments`.
         pressure: Of the mortar; it lags behind, as pressures come at the end of a chunk.
     """
 

@@ -20,7 +20,7 @@ from pydantic import Field, field_validator
 
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
-from tiengine.slab import Slab
+from tiengine.track.slab import Slab
 
 __all__ = ["Gauge", "check_gauges", "nearest_seat", "slab_under"]
 

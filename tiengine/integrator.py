@@ -33,10 +33,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from tiengine.fastening import Fastening
 from tiengine.parameters.errors import InputError
-from tiengine.rail import RailWindow
-from tiengine.slab import SlabMatrices
+from tiengine.track.fastening import Fastening
+from tiengine.track.rail import RailWindow
+from tiengine.track.slab_matrices import SlabMatrices
 
 __all__ = ["Newmark", "inverse", "rail_inverses", "seat_inverse_terms", "seat_shapes", "smearing"]
 

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from tiengine.blocks import Blocks
 from tiengine.contact.table import ContactTable
-from tiengine.fastening import Fastening, seat_count, seat_tables
 from tiengine.integrator import Newmark, inverse, seat_inverse_terms, seat_shapes, smearing
 from tiengine.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
-from tiengine.mortar import Mortar
-from tiengine.rail import Rail, RailWindow, sine_products
-from tiengine.slab import Slab, SlabMatrices
+from tiengine.track.fastening import Fastening, seat_count, seat_tables
+from tiengine.track.mortar import Mortar
+from tiengine.track.rail import Rail, RailWindow, sine_products
+from tiengine.track.slab import Slab
+from tiengine.track.slab_matrices import SlabMatrices
 from tiengine.vehicle.train import TrainModel, static_wheel_loads
 
 __all__ = ["Ingredients", "Model", "SlabDesigns", "build_model"]

@@ -20,14 +20,14 @@ from pydantic import BeforeValidator, Field
 from tiengine.contact.profile import ROUNDING_LENGTH, Profile
 from tiengine.contact.profile_files import MOST_POINTS, read_profile
 from tiengine.contact.profile_frame import placed
-from tiengine.fastening import Fastening
-from tiengine.mortar import Mortar
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.input_files import load_toml, numbers_of
 from tiengine.parameters.presets import KINDS, LONGEST_PATH, find_preset
 from tiengine.parameters.quantity import Name, Params, Q, Source, build
-from tiengine.rail import Rail
-from tiengine.slab import Slab
+from tiengine.track.fastening import Fastening
+from tiengine.track.mortar import Mortar
+from tiengine.track.rail import Rail
+from tiengine.track.slab import Slab
 from tiengine.vehicle.vehicle import Vehicle, vehicle_from_table
 
 if TYPE_CHECKING:

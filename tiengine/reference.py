@@ -18,15 +18,15 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from tiengine.fastening import Fastening
 from tiengine.fields import NumberOr
-from tiengine.mortar import Mortar
 from tiengine.parts import ProfilePoints
-from tiengine.rail import Rail
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION, GROUPS
 from tiengine.result_files.layout import GroupSpec
 from tiengine.scenario import Scenario
-from tiengine.slab import Slab
+from tiengine.track.fastening import Fastening
+from tiengine.track.mortar import Mortar
+from tiengine.track.rail import Rail
+from tiengine.track.slab import Slab
 from tiengine.vehicle.coach import Coach
 from tiengine.vehicle.vehicle import Vehicle
 

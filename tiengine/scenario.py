@@ -15,11 +15,9 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field
 
-from tiengine.defects import check_defects
 from tiengine.ensemble import Ensemble
 from tiengine.gauges import Gauge, check_gauges
 from tiengine.irregularity import IrregularityParams
-from tiengine.mortar import MortarVoid
 from tiengine.overrides import Overrides, apply_overrides
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path
@@ -28,6 +26,8 @@ from tiengine.parameters.quantity import Params, PlainName, Source, build
 from tiengine.parts import Parts, build_parts, collect_presets
 from tiengine.result_files.events import Events
 from tiengine.sections import Contact, Numerics, Output, Track, Train
+from tiengine.track.defects import check_defects
+from tiengine.track.mortar import MortarVoid
 
 __all__ = ["Scenario", "check_wavelength", "load_scenario", "to_toml"]
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from tiengine.ensemble import Ensemble
 
 if TYPE_CHECKING:
-    from tiengine.defects import FailedFastenings, MortarDefect
     from tiengine.scenario import Scenario
+    from tiengine.track.defects import FailedFastenings, MortarDefect
 
 __all__ = ["scenario_words"]
 

@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from tiengine.defects import FailedFastenings, MortarDefect
 from tiengine.fields import channel_names, check_speed, number_or
 from tiengine.parameters.quantity import Params, Q
 from tiengine.parts import Part
 from tiengine.result_files.channels import BODY, IRREGULARITY, WHEEL
+from tiengine.track.defects import FailedFastenings, MortarDefect
 from tiengine.vehicle.speed_programme import SpeedProfile
 
 __all__ = ["Contact", "Numerics", "Output", "Track", "Train"]

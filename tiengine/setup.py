@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactSettings
 from tiengine.contact.table_cache import contact_table
-from tiengine.defects import fastening_factors
 from tiengine.integrator import Newmark
 from tiengine.model import Ingredients, SlabDesigns
 from tiengine.parameters.errors import InputError
 from tiengine.scenario import Scenario
-from tiengine.slab import slab_designs
+from tiengine.track.defects import fastening_factors
+from tiengine.track.slab_matrices import slab_designs
 from tiengine.vehicle.train import TrainModel, assemble
 
 __all__ = ["contact_settings", "ingredients"]

@@ -22,8 +22,8 @@ from tiengine.kernels import layout as at
 from tiengine.result_files.channels import DEFLECTION, GAUGE_FORCE, GAUGE_MOTION, SEATS, SLABS
 from tiengine.result_files.layout import DTYPES, Block, GroupSpec
 from tiengine.scenario import Scenario
-from tiengine.slab import Slab
 from tiengine.stepper import Stepper
+from tiengine.track.slab import Slab
 
 __all__ = ["Trackside", "Watcher", "trackside_groups"]
 

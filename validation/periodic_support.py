@@ -28,11 +28,11 @@ from threadpoolctl import threadpool_limits
 from tiengine.integrator import Newmark
 from tiengine.kernels import layout as at
 from tiengine.model import Ingredients, Model, build_model
-from tiengine.rail import RailWindow
 from tiengine.scenario import load_scenario
 from tiengine.setup import ingredients
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper
+from tiengine.track.rail import RailWindow
 from validation.case import Case
 from validation.closed_forms.floquet import Seats, deflection_under_load, jump, seat_force
 from validation.rail import vertical_beam

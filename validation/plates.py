@@ -16,7 +16,8 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from tiengine.slab import SlabMatrices, load_slab, slab_matrices
+from tiengine.track.slab import load_slab
+from tiengine.track.slab_matrices import SlabMatrices, slab_matrices
 from validation.case import Case
 from validation.closed_forms.plate_ritz import frequencies
 

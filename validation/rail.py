@@ -14,8 +14,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from tiengine.parts import Parts
-from tiengine.rail import RailWindow
 from tiengine.scenario import load_scenario
+from tiengine.track.rail import RailWindow
 from validation.case import Case
 from validation.closed_forms.timoshenko import Beam, pinned_frequencies
 

@@ -19,11 +19,11 @@ import scipy.linalg
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from tiengine.fastening import Fastening
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset
 from tiengine.parameters.quantity import build
-from tiengine.rail import Rail, RailWindow
+from tiengine.track.fastening import Fastening
+from tiengine.track.rail import Rail, RailWindow
 from validation.case import Case
 from validation.closed_forms.floquet import Seats
 from validation.closed_forms.receptance import receptance

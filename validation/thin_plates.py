@@ -17,8 +17,9 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from tiengine.mortar import Mortar
-from tiengine.slab import Slab, load_slab, slab_matrices
+from tiengine.track.mortar import Mortar
+from tiengine.track.slab import Slab, load_slab
+from tiengine.track.slab_matrices import slab_matrices
 from validation.case import Case
 from validation.closed_forms.plate_beam_functions import leissa_parameters
 from validation.closed_forms.plate_ritz import frequencies

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.fastening import Fastening
-from tiengine.rail import Rail
-from tiengine.slab import Slab, SlabMatrices
+from tiengine.track.fastening import Fastening
+from tiengine.track.rail import Rail
+from tiengine.track.slab import Slab
+from tiengine.track.slab_matrices import SlabMatrices
 
 Reals = NDArray[np.float64]
 

@@ -22,15 +22,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
-from tiengine.fastening import Fastening
 from tiengine.integrator import Newmark
 from tiengine.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
 from tiengine.model import CONTACT_TOLERANCE, Ingredients
-from tiengine.mortar import Mortar
 from tiengine.parameters.errors import InputError
-from tiengine.rail import Rail
 from tiengine.scenario import Scenario
+from tiengine.track.fastening import Fastening
+from tiengine.track.mortar import Mortar
+from tiengine.track.rail import Rail
 from tiengine.vehicle.train import TrainModel, static_wheel_loads
 from validation.msm.plate import ModalSlab, modal_slab
 from validation.msm.seats import SeatTransform

@@ -19,8 +19,8 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from tiengine.mortar import Mortar, MortarVoid
-from tiengine.slab import Slab
+from tiengine.track.mortar import Mortar, MortarVoid
+from tiengine.track.slab import Slab
 
 __all__ = ["ModalSlab", "modal_slab"]
 

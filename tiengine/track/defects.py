@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tiengine.mortar import MortarVoid, bed_factors
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
-from tiengine.slab import Slab
+from tiengine.track.mortar import MortarVoid, bed_factors
+from tiengine.track.slab import Slab
 
 __all__ = ["FailedFastenings", "MortarDefect", "check_defects", "fastening_factors"]
 

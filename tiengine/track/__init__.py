@@ -1,0 +1,1 @@
+"""Track: rails, fastenings, slabs, mortar and their defects."""
