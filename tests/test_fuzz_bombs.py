@@ -15,12 +15,12 @@ import tiengine
 from tiengine.cli import main
 from tiengine.contact.profile import load_profile
 from tiengine.contact.profile_files import MOST_POINTS
+from tiengine.irregularity.measured_files import read_series
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import parse_toml
 from tiengine.result_files.checkpoint import Checkpoint
 from tiengine.result_files.output_file import check_output
 from tiengine.scenario import load_scenario
-from tiengine.track_files import read_series
 
 from .fuzzing import deadline, refused
 

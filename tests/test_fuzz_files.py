@@ -9,8 +9,8 @@ import pytest
 from hypothesis import strategies as st
 
 from tiengine.contact.profile import Kind, Profile, load_profile
-from tiengine.irregularity import IrregularityParams, make_irregularity
-from tiengine.track_files import LARGEST_CHAINAGE, LARGEST_HEIGHT, read_series
+from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
+from tiengine.irregularity.measured_files import LARGEST_CHAINAGE, LARGEST_HEIGHT, read_series
 
 from .fuzzing import DAMAGES, EXAMPLES, Damage, mutated_texts, on_many, refused
 from .test_profile_files import columns, miniprof, simpack

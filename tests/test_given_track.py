@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tiengine.irregularity import IrregularityParams, from_function, make_irregularity
+from tiengine.irregularity.irregularity import IrregularityParams, from_function, make_irregularity
 from tiengine.parameters.errors import InputError
 
 FAR = -1e9  # the irregularity has begun long before any chainage of these tests

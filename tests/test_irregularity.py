@@ -8,16 +8,14 @@ from pydantic import ValidationError
 from scipy.signal import welch
 from scipy.stats import chi2
 
-from tiengine.irregularity import (
+from tiengine.irregularity.irregularity import (
     HALF_BASE,
     PATCH_HALF_LENGTH,
     IrregularityParams,
     at_wheels,
     make_irregularity,
 )
-from tiengine.parameters.errors import InputError
-from tiengine.parameters.quantity import explain
-from tiengine.spectrum import (
+from tiengine.irregularity.spectrum import (
     CHANNELS,
     band_variances,
     contact_filter,
@@ -25,6 +23,8 @@ from tiengine.spectrum import (
     load_spectrum,
     sigma,
 )
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.quantity import explain
 
 FAR = -1e9  # the irregularity has begun long before any chainage of these tests
 LOW = load_spectrum("german_low")

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from threadpoolctl import threadpool_limits
 
-from tiengine.irregularity import make_irregularity
+from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.start import equilibrium
 from tiengine.state import State
 from validation.bdf import RTOL, SHORT, SIZES, STEPS

@@ -197,7 +197,7 @@ def test_forces_have_the_expected_size(file):
 def test_two_ways_of_reading_agree(file):
     """``tiengine.open`` and the irregularity that the wheels felt."""
     import tiengine
-    from tiengine.irregularity import at_wheels, make_irregularity
+    from tiengine.irregularity.irregularity import at_wheels, make_irregularity
 
     with tiengine.open(file) as result:
         felt, wheel = result.irregularity(), result.wheel()

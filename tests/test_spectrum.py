@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tiengine.parameters.errors import InputError
-from tiengine.spectrum import (
+from tiengine.irregularity.spectrum import (
     CHANNELS,
     band_variances,
     contact_filter,
@@ -13,6 +12,7 @@ from tiengine.spectrum import (
     sigma,
     spectrum_names,
 )
+from tiengine.parameters.errors import InputError
 
 HALF_DIGIT = 0.0005  # references are printed with three decimals
 MILLI = 1e-3

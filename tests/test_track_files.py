@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tiengine.irregularity import IrregularityParams, at_wheels, make_irregularity
+from tiengine.irregularity.irregularity import IrregularityParams, at_wheels, make_irregularity
+from tiengine.irregularity.measured_files import LEVEL_BASE, band_passed, read_series
 from tiengine.parameters.errors import InputError
-from tiengine.track_files import LEVEL_BASE, band_passed, read_series
 
 DATA = Path(__file__).parent / "data"
 X = np.arange(0.0, 60.0, 0.5)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.guards import Guard
-from tiengine.irregularity import Irregularity, check_reach, make_irregularity
+from tiengine.irregularity.irregularity import Irregularity, check_reach, make_irregularity
 from tiengine.kernels import layout as at
 from tiengine.memory import peak_memory
 from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved

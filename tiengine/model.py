@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tiengine.blocks import Blocks
 from tiengine.contact.table import ContactTable
 from tiengine.integrator import Newmark, inverse, seat_inverse_terms, seat_shapes, smearing
-from tiengine.irregularity import HALF_BASE
+from tiengine.irregularity.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
 from tiengine.track.fastening import Fastening, seat_count, seat_tables
 from tiengine.track.mortar import Mortar

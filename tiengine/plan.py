@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tiengine.irregularity import IrregularityParams, make_irregularity
+from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
 from tiengine.scenario import Scenario, to_toml
 
 __all__ = ["TRAINS_TOGETHER", "Task", "plan"]

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from tiengine import backend
 from tiengine.integrator import Newmark
-from tiengine.irregularity import IrregularityParams, make_irregularity
+from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
 from tiengine.model import Ingredients, Model, build_model
 from tiengine.parameters.errors import InputError
 from tiengine.scenario import Scenario, check_wavelength, load_scenario, to_toml

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from tiengine.ensemble import Ensemble
 from tiengine.gauges import Gauge, check_gauges
-from tiengine.irregularity import IrregularityParams
+from tiengine.irregularity.irregularity import IrregularityParams
 from tiengine.overrides import Overrides, apply_overrides
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path

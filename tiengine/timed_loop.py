@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.guards import Guard
-from tiengine.irregularity import Irregularity
+from tiengine.irregularity.irregularity import Irregularity
 from tiengine.march import CHUNK_STEPS
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recorder import Recorder

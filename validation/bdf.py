@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from tiengine.irregularity import make_irregularity
+from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.scenario import load_scenario
 from tiengine.simulate import prepare
 from tiengine.start import equilibrium

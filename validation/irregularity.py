@@ -12,8 +12,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.irregularity import IrregularityParams, make_irregularity
-from tiengine.spectrum import CHANNELS, band_variances, load_spectrum, sigma
+from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
+from tiengine.irregularity.spectrum import CHANNELS, band_variances, load_spectrum, sigma
 from validation.case import Case
 
 Reals = NDArray[np.float64]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from tiengine.irregularity import make_irregularity
+from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.scenario import Scenario, load_scenario
 from tiengine.simulate import prepare as prepare_window
 from tiengine.start import equilibrium

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine.integrator import Newmark
-from tiengine.irregularity import make_irregularity
+from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.kernels import layout as at
 from tiengine.model import Ingredients, Model, build_model
 from tiengine.scenario import Scenario, load_scenario

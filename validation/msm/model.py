@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
 from tiengine.integrator import Newmark
-from tiengine.irregularity import HALF_BASE
+from tiengine.irregularity.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
 from tiengine.model import CONTACT_TOLERANCE, Ingredients
 from tiengine.parameters.errors import InputError

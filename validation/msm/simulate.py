@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine import backend
-from tiengine.irregularity import Irregularity, make_irregularity
+from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.parameters.errors import InputError
 from tiengine.recorder import Recorder, Samples
 from tiengine.result_files.reader import Result

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tiengine.irregularity import Irregularity, make_irregularity
+from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.model import Ingredients, build_model
 from tiengine.recorder import Recorder
 from tiengine.scenario import Scenario

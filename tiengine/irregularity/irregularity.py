@@ -14,17 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator
 
-from tiengine.given_track import (
-    FunctionTrack,
-    MeasuredTrack,
-    UserFunction,
-    function_spline,
-    smooth_step,
-)
-from tiengine.parameters.errors import InputError, nearest
-from tiengine.parameters.quantity import Params, Q
-from tiengine.realisation import BlockSpline, noise_spline
-from tiengine.spectrum import (
+from tiengine.irregularity.given_track import FunctionTrack, MeasuredTrack, UserFunction, function_spline, smooth_step
+from tiengine.irregularity.measured_files import band_passed, read_series
+from tiengine.irregularity.random_track import BlockSpline, noise_spline
+from tiengine.irregularity.spectrum import (
     CHANNELS,
     Density,
     contact_filter,
@@ -32,7 +25,8 @@ from tiengine.spectrum import (
     load_spectrum,
     spectrum_names,
 )
-from tiengine.track_files import band_passed, read_series
+from tiengine.parameters.errors import InputError, nearest
+from tiengine.parameters.quantity import Params, Q
 
 __all__ = [
     "HALF_BASE",

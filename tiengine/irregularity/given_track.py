@@ -1,4 +1,4 @@
-"""Tracks that are given: a measured series (:mod:`tiengine.track_files`), or a user's function of chainage."""
+"""Tracks that are given: a measured series (:mod:`tiengine.irregularity.measured_files`), or a user's function of chainage."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from tiengine.irregularity.random_track import BlockSpline, sampled_spline
 from tiengine.parameters.errors import InputError
-from tiengine.realisation import BlockSpline, sampled_spline
 
 __all__ = [
     "FunctionTrack",

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from tiengine.spectrum import Density, band_variances
+from tiengine.irregularity.spectrum import Density, band_variances
 
 __all__ = ["BlockSpline", "NoiseBlocks", "noise_spline", "sampled_spline"]
 

@@ -1,0 +1,1 @@
+"""Track irregularity: spectra, random and measured track."""
