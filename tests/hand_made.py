@@ -12,7 +12,7 @@ import numpy as np
 from tiengine.result_files import reader as results
 from tiengine.result_files.damage import LAYOUT
 from tiengine.result_files.reader import FORMAT, FORMAT_VERSION, Result
-from tiengine.scenario import Scenario, load_scenario, to_toml
+from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.vehicle.train import assemble, static_wheel_loads
 
 V = 350.0 / 3.6  # m/s

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tiengine.integrator import Newmark
 from tiengine.kernels import layout as at
 from tiengine.model import Ingredients, Model, build_model
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.setup import ingredients
 from tiengine.start import equilibrium
 from tiengine.state import State

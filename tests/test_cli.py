@@ -25,7 +25,7 @@ from tiengine.parameters.presets import KINDS, preset_names
 from tiengine.result_files import reader as results
 from tiengine.result_files.channels import WHEEL
 from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
-from tiengine.scenario import to_toml
+from tiengine.scenario.scenario import to_toml
 
 LABELS = TrainLabels(["coach"], ["car"], np.zeros(4, np.int64), np.array([10.0, 7.5, -7.5, -10.0]))
 

@@ -1,6 +1,6 @@
 """The default numerics are the ones that the convergence study chose."""
 
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from validation.convergence import RECOMMENDED
 
 

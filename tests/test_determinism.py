@@ -13,7 +13,7 @@ import pytest
 
 from tiengine import simulate
 from tiengine.kernels import layout as at
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 
 from .reference.marching import March, march, model_of
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from tiengine.reference import page, tables, with_channels
+from tiengine.scenario.manual import page, tables, with_channels
 
 ROOT = Path(__file__).parents[1]
-RELOAD = "; bring it up to date by python -m tiengine.reference docs"
+RELOAD = "; bring it up to date by python -m tiengine.scenario.manual docs"
 
 
 @pytest.fixture(scope="module")

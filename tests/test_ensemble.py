@@ -25,7 +25,7 @@ from tiengine.plan import plan
 from tiengine.result_files import reader as results
 from tiengine.result_files.checkpoint import checkpoint_paths
 from tiengine.result_files.reader import Result
-from tiengine.scenario import Scenario, load_scenario, to_toml
+from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 
 SHORT = {
     "train.distance": 3.0,

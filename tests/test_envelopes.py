@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tiengine.envelopes import SeatEnvelopes, SlabEnvelopes, watched_seats
 from tiengine.kernels import layout as at
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.stepper import Stepper
 from tiengine.track.plate_shapes import moment_operator
 

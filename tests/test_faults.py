@@ -26,7 +26,7 @@ from tiengine.result_files.file_lock import locked, release
 from tiengine.result_files.journal import atomic_write, journal_of
 from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
 from tiengine.result_files.writer import Writer
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from validation.faults.contents import contents, litter
 from validation.faults.page import page, rows
 from validation.faults.plan import RUNS, kills
@@ -241,7 +241,7 @@ def test_a_full_disk_is_one_sentence_and_keeps_what_was_committed(tmp_path, monk
             writer.describe(0, {"simulated_time": 1.0})
         writer.commit()
 
-    with pytest.raises(InputError, match=r"run\.h5': cannot be written .*No space left"), begun(path) as writer:  # noqa: PT012
+    with pytest.raises(InputError, match=r"run\.h5': cannot be written .*No space left"), begun(path) as writer:
         write(writer, 0)
         writer.commit()
         go_on(writer)

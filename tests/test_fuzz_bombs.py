@@ -20,7 +20,7 @@ from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import parse_toml
 from tiengine.result_files.checkpoint import Checkpoint
 from tiengine.result_files.output_file import check_output
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 
 from .fuzzing import deadline, refused
 

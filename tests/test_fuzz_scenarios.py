@@ -19,11 +19,11 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from tiengine import simulate
-from tiengine.fields import NumberOr
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.parameters.input_files import parse_toml
 from tiengine.parameters.quantity import Params, build
-from tiengine.scenario import Scenario, load_scenario, to_toml
+from tiengine.scenario.key_checks import NumberOr
+from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 
 from .fuzzing import BAD, EXAMPLES, mutated_texts, on_many, refused
 

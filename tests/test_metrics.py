@@ -19,7 +19,7 @@ from tiengine.result_files import reader as results
 from tiengine.result_files.channels import WHEEL
 from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
 from tiengine.ride import Ride
-from tiengine.scenario import Scenario, load_scenario, to_toml
+from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.vehicle.train import assemble, static_wheel_loads
 
 SPEED = 97.0  # m/s, as written

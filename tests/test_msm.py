@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tiengine.parameters.errors import InputError
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.simulate import run
 from tiengine.track.mortar import MortarVoid
 from tiengine.track.slab import load_slab

@@ -7,8 +7,8 @@ import pytest
 
 from tiengine.contact.table_cache import contact_table
 from tiengine.p2 import contact_stiffness, p2_frequency, p2_of
-from tiengine.scenario import load_scenario
-from tiengine.setup import contact_settings
+from tiengine.scenario.contact_settings import contact_settings
+from tiengine.scenario.scenario import load_scenario
 from tiengine.vehicle.train import assemble, static_wheel_loads
 from validation.closed_forms.two_mass import WheelOnTrack, two_mass_frequencies
 

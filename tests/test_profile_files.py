@@ -11,7 +11,7 @@ import pytest
 from tiengine.contact.profile import Profile, load_profile
 from tiengine.contact.table import ContactSettings, WheelRailPair
 from tiengine.parameters.errors import InputError
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 
 DATA = Path(__file__).parent / "data"
 HEAD_Y = np.arange(-30.0, 31.0, 5.0) * 1e-3  # of tests/data/head.*

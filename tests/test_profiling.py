@@ -21,7 +21,7 @@ from tiengine.products import count_products
 from tiengine.profile_report import ProfileReport, compare, read_json
 from tiengine.result_files.events import Event
 from tiengine.roofs import Roofs
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.timed_loop import StageTimers, Times
 
 from .models import V350, Run, paper_model

@@ -19,7 +19,7 @@ from tiengine.figures.source import Train
 from tiengine.key_figures import KeyFigure, key_figures, summarise
 from tiengine.report import render
 from tiengine.result_files import reader as results
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.scenario_words import scenario_words
 
 from . import hand_made as by

@@ -16,7 +16,7 @@ from tiengine import simulate
 from tiengine.parameters.errors import InputError, RunStoppedError
 from tiengine.result_files import reader as results
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths, sealed
-from tiengine.scenario import Scenario, load_scenario
+from tiengine.scenario.scenario import Scenario, load_scenario
 
 SHORT = {
     "train.distance": 45.0,  # three chunks of 1000 steps at 300 km/h

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from tiengine.contact.profile import load_profile
-from tiengine.overrides import parse_value
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import KINDS, find_preset, preset_names, preset_source
-from tiengine.scenario import check_wavelength, load_scenario, to_toml
+from tiengine.scenario.overrides import parse_value
+from tiengine.scenario.scenario import check_wavelength, load_scenario, to_toml
 from tiengine.track.defects import FailedFastenings, MortarDefect, fastening_factors
 from tiengine.vehicle.vehicle import load_vehicle
 

@@ -8,7 +8,7 @@ import pytest
 from tiengine import simulate
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.stability import TOLERATED_GROWTH, energy_growth
 from tiengine.vehicle.train import static_wheel_loads
 

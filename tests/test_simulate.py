@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tiengine import simulate
 from tiengine.kernels import layout as at
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.state import State
 from tiengine.track_static import StaticTrack
 

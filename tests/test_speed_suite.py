@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from validation.speed import findings
 from validation.speed.__main__ import CASES as MEASURED
 from validation.speed.effort import effort

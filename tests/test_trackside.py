@@ -13,7 +13,7 @@ from tiengine import march, simulate
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.result_files import reader as results
 from tiengine.result_files.reader import Result
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 
 from .models import V350
 

@@ -15,7 +15,7 @@ from tiengine.result_files import reader as results
 from tiengine.result_files.channels import BODY, DOFS, IRREGULARITY, WHEEL
 from tiengine.result_files.output_file import check_output
 from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
-from tiengine.scenario import load_scenario, to_toml
+from tiengine.scenario.scenario import load_scenario, to_toml
 
 STEP = 1e-4
 SPEED = 97.0

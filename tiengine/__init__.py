@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tiengine.parameters.errors import InputError as InputError
     from tiengine.result_files.reader import Result as Result
     from tiengine.result_files.reader import open as open
-    from tiengine.scenario import load_scenario as load_scenario
+    from tiengine.scenario.scenario import load_scenario as load_scenario
     from tiengine.simulate import resume as resume
     from tiengine.simulate import run as run
 
@@ -24,7 +24,7 @@ __all__ = ["InputError", "Result", "load_scenario", "open", "resume", "run"]
 _HOMES = {
     "InputError": "tiengine.parameters.errors",
     "Result": "tiengine.result_files.reader",
-    "load_scenario": "tiengine.scenario",
+    "load_scenario": "tiengine.scenario.scenario",
     "open": "tiengine.result_files.reader",
     "resume": "tiengine.simulate",
     "run": "tiengine.simulate",

@@ -69,7 +69,7 @@ def profile(
         profile_tables.show(profile_tables.comparison_table(comparison, [str(path) for path in compare]))
         return
 
-    from tiengine.scenario import load_scenario
+    from tiengine.scenario.scenario import load_scenario
 
     resolved = load_scenario(scenario, settings)
     if file is not None:

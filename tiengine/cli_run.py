@@ -58,7 +58,7 @@ def run(
     force: bool,
 ) -> None:
     """Simulate SCENARIO, the name of a built-in one or the path of a TOML file: one train or an ensemble."""
-    from tiengine.scenario import load_scenario
+    from tiengine.scenario.scenario import load_scenario
 
     resolved = load_scenario(scenario, settings)
     path = output or Path(f"{Path(resolved.name).name}.h5")

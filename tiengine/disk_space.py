@@ -6,17 +6,15 @@ import math
 import shutil
 from pathlib import Path
 
-import numpy as np
-
 from tiengine.deflection import window_points
 from tiengine.parameters.errors import InputError
 from tiengine.recorder import Recorder
 from tiengine.result_files.channels import DOFS
 from tiengine.result_files.layout import CHUNK
-from tiengine.scenario import Scenario
+from tiengine.scenario.scenario import Scenario, duration
 from tiengine.trackside import trackside_groups
 
-__all__ = ["check_space", "duration", "estimated_bytes"]
+__all__ = ["check_space", "estimated_bytes"]
 
 USUAL_STEP = 2e-4
 """Step [s] that "auto" means here: it tries longer ones first."""
@@ -56,18 +54,6 @@ def check_space(scenario: Scenario, path: Path) -> None:
             f"output = '{path}': needs some {_size(needed)}, {_size(free)} are free: {_size(needed - free)} are"
             " missing; record fewer channels, longer output intervals, or write to another disk"
         )
-
-
-def duration(train: Scenario) -> float:
-    """Time that the way of one train takes [s].
-
-    Args:
-        train: Its scenario.
-    """
-    start = train.rear + train.centre_in_window
-    x = np.linspace(start, start + train.train.distance, 200)
-    slowness = np.array([1.0 / train.train.speed.at(float(here))[0] for here in x])
-    return float(np.trapezoid(slowness, x))
 
 
 def _bytes_of(train: Scenario) -> float:

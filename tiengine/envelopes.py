@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tiengine.kernels import layout as at
 from tiengine.model import Model
 from tiengine.result_files.layout import Block
-from tiengine.scenario import Scenario
+from tiengine.scenario.scenario import Scenario
 from tiengine.slot_extremes import SlotExtremes
 from tiengine.state import State
 from tiengine.stepper import Stepper

@@ -15,7 +15,8 @@ from tiengine.contact.table import ContactTable
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import SHIFT
 from tiengine.result_files.channels import DOFS, SIDES
-from tiengine.result_files.events import EVENT_KINDS, Event, Events
+from tiengine.result_files.events import EVENT_KINDS, Event
+from tiengine.scenario.event_policy import Events
 from tiengine.stepper import Stepper
 
 __all__ = ["Guard", "Watch"]

@@ -28,7 +28,7 @@ from tiengine.prepare import prepare
 from tiengine.recorder import Recorder
 from tiengine.result_files.checkpoint import Checkpoint
 from tiengine.result_files.layout import Block, TrainLabels
-from tiengine.scenario import Scenario
+from tiengine.scenario.scenario import Scenario
 from tiengine.start import equilibrium, release
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper

@@ -15,7 +15,7 @@ from tiengine.ride import Ride
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Result
-    from tiengine.scenario import Scenario
+    from tiengine.scenario.scenario import Scenario
 
 __all__ = ["Metrics", "Spread", "TrainMetrics", "evaluate"]
 

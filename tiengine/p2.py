@@ -24,7 +24,7 @@ from tiengine.contact.table import SMALLEST_CURVATURE, ContactSettings, WheelRai
 from tiengine.vehicle.train import assemble, static_wheel_loads
 
 if TYPE_CHECKING:
-    from tiengine.parts import Parts
+    from tiengine.scenario.parts import Parts
 
 __all__ = ["contact_stiffness", "p2_frequency", "p2_of"]
 

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 
 from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
-from tiengine.scenario import Scenario, to_toml
+from tiengine.scenario.scenario import Scenario, to_toml
 
 __all__ = ["TRAINS_TOGETHER", "Task", "plan"]
 

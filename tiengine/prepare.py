@@ -11,8 +11,8 @@ from tiengine.integrator import Newmark
 from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
 from tiengine.model import Ingredients, Model, build_model
 from tiengine.parameters.errors import InputError
-from tiengine.scenario import Scenario, check_wavelength, load_scenario, to_toml
-from tiengine.sections import Output
+from tiengine.scenario.scenario import Scenario, check_wavelength, load_scenario, to_toml
+from tiengine.scenario.tables import Output
 from tiengine.setup import ingredients
 from tiengine.stability import TOLERATED_GROWTH, energy_growth
 from tiengine.state import State

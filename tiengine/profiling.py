@@ -27,7 +27,7 @@ from tiengine.products import Work, count_products
 from tiengine.profile_report import Loop, Memory, ProfileReport, Rate, Stage, Wall
 from tiengine.result_files.writer import Writer
 from tiengine.roofs import Roofs, measure_roofs
-from tiengine.scenario import Scenario, load_scenario, to_toml
+from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.stage_split import contact_us, suspension_us
 from tiengine.timed_loop import REST, StageTimers, TimedLoop, Times, shown
 from tiengine.trackside import trackside_groups

@@ -12,7 +12,7 @@ from tiengine.kernels import layout as at
 from tiengine.result_files.channels import MORTAR
 from tiengine.result_files.layout import DTYPES
 from tiengine.result_files.writer import Block, GroupSpec, TrainLabels, Writer
-from tiengine.scenario import Scenario
+from tiengine.scenario.scenario import Scenario
 from tiengine.stepper import Chunk
 from tiengine.vehicle.train import TrainModel
 

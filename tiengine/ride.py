@@ -24,7 +24,7 @@ from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Result
-    from tiengine.scenario import Scenario
+    from tiengine.scenario.scenario import Scenario
     from tiengine.vehicle.vehicle import Vehicle
 
 __all__ = ["FORCE_CUT_OFF", "FloorPoint", "Forces", "Ride"]

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tiengine.ensemble import Ensemble
+from tiengine.scenario.ensemble import Ensemble
 
 if TYPE_CHECKING:
-    from tiengine.scenario import Scenario
+    from tiengine.scenario.scenario import Scenario
     from tiengine.track.defects import FailedFastenings, MortarDefect
 
 __all__ = ["scenario_words"]

@@ -7,17 +7,16 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.contact.table import ContactSettings
 from tiengine.contact.table_cache import contact_table
 from tiengine.integrator import Newmark
 from tiengine.model import Ingredients, SlabDesigns
-from tiengine.parameters.errors import InputError
-from tiengine.scenario import Scenario
+from tiengine.scenario.contact_settings import contact_settings
+from tiengine.scenario.scenario import Scenario
 from tiengine.track.defects import fastening_factors
 from tiengine.track.slab_matrices import slab_designs
-from tiengine.vehicle.train import TrainModel, assemble
+from tiengine.vehicle.train import assemble
 
-__all__ = ["contact_settings", "ingredients"]
+__all__ = ["ingredients"]
 
 
 def ingredients(scenario: Scenario, dt: float) -> Ingredients:
@@ -51,32 +50,6 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         local_compliance=numerics.truncation == "local",
         absorbing_zone=numerics.absorbing_zone,
         explicit_mortar=numerics.mortar == "explicit",
-    )
-
-
-def contact_settings(scenario: Scenario, train: TrainModel) -> ContactSettings:
-    """How the scenario places its wheels on its rails, and what they are made of; one kind of wheel in a train.
-
-    Raises:
-        InputError: Vehicles whose wheels differ.
-    """
-    parts, track = scenario.parts, scenario.track
-    for what, values in (("wheel_radius", train.wheel_radius), ("half_span_contact", train.half_spacing)):
-        if np.ptp(values) > 0.0:
-            raise InputError(
-                f"train.vehicles: {what} is {values.min():g} and {values.max():g} m;"
-                " vehicles of one train must agree, they share a contact table"
-            )
-    return ContactSettings(
-        gauge=track.gauge,
-        gauge_depth=track.gauge_depth,
-        cant=track.cant,
-        half_spacing=float(train.half_spacing[0]),
-        wheel_radius=float(train.wheel_radius[0]),
-        E=parts.rail.E,
-        nu=parts.rail.nu,
-        hertz=scenario.contact.hertz,
-        smoothing=scenario.contact.smoothing,
     )
 
 

@@ -26,7 +26,7 @@ from tiengine.result_files.output_file import check_output
 from tiengine.result_files.reader import Result
 from tiengine.result_files.reader import open as open_result
 from tiengine.result_files.writer import Writer
-from tiengine.scenario import Scenario, load_scenario, to_toml
+from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.simulation import IMPORT_BEGAN
 from tiengine.trackside import trackside_groups
 from tiengine.worker import distribute

@@ -18,7 +18,7 @@ from tiengine.march import CHUNK_STEPS
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recorder import Recorder
 from tiengine.result_files.writer import Writer
-from tiengine.scenario import Scenario
+from tiengine.scenario.scenario import Scenario
 from tiengine.stepper import Stepper
 from tiengine.trackside import Trackside
 

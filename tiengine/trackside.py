@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from tiengine.deflection import Deflection
 from tiengine.envelopes import SeatEnvelopes, SlabEnvelopes
 from tiengine.gauge_samples import gauge_samples
-from tiengine.gauges import Gauge, nearest_seat
 from tiengine.kernels import layout as at
 from tiengine.result_files.channels import DEFLECTION, GAUGE_FORCE, GAUGE_MOTION, SEATS, SLABS
 from tiengine.result_files.layout import DTYPES, Block, GroupSpec
-from tiengine.scenario import Scenario
+from tiengine.scenario.gauges import Gauge, nearest_seat
+from tiengine.scenario.scenario import Scenario
 from tiengine.stepper import Stepper
 from tiengine.track.slab import Slab
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from tiengine import backend
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from validation.case import Outcome, evaluate
 from validation.table import headlines, insert, keep, markdown, show
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from tiengine.irregularity.irregularity import make_irregularity
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.simulate import prepare
 from tiengine.start import equilibrium
 from tiengine.state import State

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from tiengine.contact.table import WheelRailPair
 from tiengine.parameters.errors import RunFailedError
-from tiengine.scenario import Scenario, load_scenario
+from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.setup import ingredients
 from tiengine.simulate import run
 from tiengine.vehicle.train import TrainModel, static_wheel_loads

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tiengine.contact.table import WheelRailPair
-from tiengine.scenario import Scenario, load_scenario
+from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.setup import ingredients
 from tiengine.simulate import run
 from validation.case import Case

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from tiengine.model import Model, build_model
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.setup import ingredients
 
 __all__ = ["paper_model"]

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import RailWindow
 from validation.case import Case
 from validation.closed_forms.timoshenko import moving_load_deflection, static_missing_share

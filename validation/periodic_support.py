@@ -28,7 +28,7 @@ from threadpoolctl import threadpool_limits
 from tiengine.integrator import Newmark
 from tiengine.kernels import layout as at
 from tiengine.model import Ingredients, Model, build_model
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.setup import ingredients
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper

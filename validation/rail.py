@@ -13,8 +13,8 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from tiengine.parts import Parts
-from tiengine.scenario import load_scenario
+from tiengine.scenario.parts import Parts
+from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import RailWindow
 from validation.case import Case
 from validation.closed_forms.timoshenko import Beam, pinned_frequencies

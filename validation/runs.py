@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.result_files.reader import Result
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.simulate import run
 from validation.msm.simulate import FullLength, run_full_length
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine.integrator import Newmark
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import Rail, RailWindow
 from validation.case import Case
 from validation.closed_forms.supported_beam import (

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from tiengine import backend
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.setup import ingredients
 from tiengine.simulate import run
 from tiengine.vehicle.train import assemble, static_wheel_loads

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine.irregularity.irregularity import make_irregularity
-from tiengine.scenario import Scenario, load_scenario
+from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.simulate import prepare as prepare_window
 from tiengine.start import equilibrium
 from tiengine.state import State

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import Rail, RailWindow
 from validation.case import Case
 from validation.closed_forms.timoshenko import Beam, moving_load_deflection, static_missing_share

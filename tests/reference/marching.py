@@ -15,7 +15,7 @@ from tiengine.integrator import Newmark
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.kernels import layout as at
 from tiengine.model import Ingredients, Model, build_model
-from tiengine.scenario import Scenario, load_scenario
+from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.setup import ingredients
 from tiengine.start import equilibrium, release
 from tiengine.state import State

@@ -17,7 +17,7 @@ from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Result
-    from tiengine.scenario import Scenario
+    from tiengine.scenario.scenario import Scenario
 
 __all__ = ["AbsentError", "Samples", "Train"]
 
@@ -209,6 +209,6 @@ def members_of(result: Result) -> tuple[Scenario, ...]:
 @lru_cache(maxsize=2)
 def _members(text: str) -> tuple[Scenario, ...]:
     """Of the scenario's text: a report draws ten figures, and a large ensemble's trains take seconds to build."""
-    from tiengine.scenario import load_scenario  # Taichi comes with it
+    from tiengine.scenario.scenario import load_scenario  # Taichi comes with it
 
     return load_scenario(parse_toml(text, "scenario")).members

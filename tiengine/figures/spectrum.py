@@ -17,7 +17,7 @@ from tiengine.figures.palette import BLACK, BLUE, GREEN, ORANGE
 from tiengine.figures.source import SLICE, AbsentError, Samples, Train
 from tiengine.figures.style import LEFT, RIGHT, Look, in_style, new_figure, plain
 from tiengine.p2 import p2_of
-from tiengine.setup import contact_settings
+from tiengine.scenario.contact_settings import contact_settings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tiengine.result_files.channels import DIRECTIONS, DOFS, GROUPS, SIDES, Channel
 
-__all__ = ["Axis", "Block", "CHUNK", "DTYPES", "GroupSpec", "SEAT", "SLAB", "TIME", "TrainLabels"]
+__all__ = ["CHUNK", "DTYPES", "SEAT", "SLAB", "TIME", "Axis", "Block", "GroupSpec", "TrainLabels"]
 
 Reals = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
     from tiengine.metrics import Metrics
-    from tiengine.scenario import Scenario
+    from tiengine.scenario.scenario import Scenario
 
 __all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "RUNNING", "Result", "open"]
 
@@ -150,7 +150,7 @@ class Result:
     @property
     def scenario(self) -> Scenario:
         """The scenario that was run."""
-        from tiengine.scenario import load_scenario  # Taichi comes with it: not for those who only read
+        from tiengine.scenario.scenario import load_scenario  # Taichi comes with it: not for those who only read
 
         return load_scenario(parse_toml(self.scenario_toml, f"{self.name}: scenario"))
 

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "GAUSS_POINTS",
-    "W",
     "WX",
     "WXX",
     "WXY",
     "WY",
     "WYY",
+    "W",
     "element_dofs",
     "locate",
     "moment_operator",

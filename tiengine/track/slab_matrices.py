@@ -12,6 +12,7 @@ from tiengine.kernels import plate
 from tiengine.parameters.errors import InputError
 from tiengine.track.mortar import GAUSS, Mortar, MortarVoid, bed_factors
 from tiengine.track.plate_shapes import WY, W, element_dofs, shapes_at, tabulate_shapes
+from tiengine.track.slab import Slab
 
 
 @dataclass(frozen=True)

@@ -161,7 +161,7 @@ def _try(
     for n in range(0, len(calls), stride):
         for torn in (False, True) if calls[n].startswith("write") else (False,):
             here = shutil.copytree(template, folder / "here")
-            in_copy(lambda: session(here), at_call(n), torn)  # noqa: B023
+            in_copy(lambda: session(here), at_call(n), torn)
             done = sum(end <= n for end, _ in states) - 1
             allowed = [states[k][1] for k in (done, done + 1) if k < len(states)]
             found.deaths += 1
@@ -267,7 +267,7 @@ def _die_completing(folder: Path, allowed: list[Any], where: str, found: Boundar
     n = 0
     while True:
         again = shutil.copytree(folder, folder.with_name("again"))
-        status = in_copy(lambda: results.open(again / NAME).close(), at_call(n))  # noqa: B023
+        status = in_copy(lambda: results.open(again / NAME).close(), at_call(n))
         found.twice += status == DIED
         results.open(again / NAME).close()
         if _state(again) not in allowed:

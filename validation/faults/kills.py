@@ -87,7 +87,7 @@ class Yard:
     def _undisturbed(self) -> Contents:
         """In this process: kernels stay compiled."""
         from tiengine import simulate
-        from tiengine.scenario import load_scenario
+        from tiengine.scenario.scenario import load_scenario
 
         keep_shapes()
         words = self.run.arguments

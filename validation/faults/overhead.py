@@ -21,7 +21,7 @@ from tiengine.march import Run, _facts
 from tiengine.messages import Begun, Saved
 from tiengine.plan import plan
 from tiengine.result_files.writer import Writer
-from tiengine.scenario import load_scenario, to_toml
+from tiengine.scenario.scenario import load_scenario, to_toml
 from tiengine.simulate import CHECKPOINT_SECONDS, _groups
 
 __all__ = ["Overhead", "overhead"]

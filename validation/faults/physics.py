@@ -14,7 +14,7 @@ from tiengine import march, prepare, simulate
 from tiengine.guards import LIMITS
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from validation.faults.contents import Contents, contents
 from validation.faults.plan import SEED
 from validation.faults.space import Check

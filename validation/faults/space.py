@@ -12,7 +12,7 @@ from typing import Any
 
 from tiengine import simulate
 from tiengine.disk_space import estimated_bytes
-from tiengine.scenario import load_scenario
+from tiengine.scenario.scenario import load_scenario
 from validation.faults.kills import NAME, Yard
 from validation.faults.launch import Process
 

@@ -27,7 +27,7 @@ from tiengine.irregularity.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
 from tiengine.model import CONTACT_TOLERANCE, Ingredients
 from tiengine.parameters.errors import InputError
-from tiengine.scenario import Scenario
+from tiengine.scenario.scenario import Scenario
 from tiengine.track.fastening import Fastening
 from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail

@@ -17,7 +17,7 @@ from tiengine.parameters.errors import InputError
 from tiengine.recorder import Recorder, Samples
 from tiengine.result_files.reader import Result
 from tiengine.result_files.writer import Writer
-from tiengine.scenario import Scenario, load_scenario, to_toml
+from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.setup import ingredients
 from tiengine.simulate import Progress
 from validation.msm.model import FullTrack, build_track

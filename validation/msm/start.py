@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
 from tiengine.model import Ingredients, build_model
-from tiengine.scenario import Scenario
+from tiengine.scenario.scenario import Scenario
 from tiengine.start import equilibrium
 from tiengine.state import State
 from validation.msm.model import FullTrack

@@ -12,7 +12,7 @@ import numpy as np
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.model import Ingredients, build_model
 from tiengine.recorder import Recorder
-from tiengine.scenario import Scenario
+from tiengine.scenario.scenario import Scenario
 from tiengine.start import equilibrium
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper

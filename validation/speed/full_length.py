@@ -71,7 +71,7 @@ def profile_full_length(slab_modes: int, steps: int) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits  # here: the parent imports no more than it needs
 
     from tiengine.irregularity.irregularity import make_irregularity
-    from tiengine.scenario import load_scenario
+    from tiengine.scenario.scenario import load_scenario
     from validation.msm.simulate import FullLength, load, prepare
 
     way = 0.8 * RAIL

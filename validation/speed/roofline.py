@@ -46,6 +46,6 @@ def profiled(trains: int, steps: int) -> dict[str, Any]:
         steps: How many to measure.
     """
     from tiengine.profiling import profile  # here: the parent starts no Taichi
-    from tiengine.scenario import load_scenario
+    from tiengine.scenario.scenario import load_scenario
 
     return asdict(profile(load_scenario("paper", settings_of(RUNS["paper"], WAY)), trains=trains, steps=steps))

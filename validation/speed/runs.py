@@ -71,7 +71,7 @@ def perform(run: Run, distance: float) -> Facts:
         Attributes of the result, times in s, memory in MB, and ``file_mb``.
     """
     from tiengine.memory import peak_memory  # here: the parent measures nothing and imports little
-    from tiengine.scenario import load_scenario
+    from tiengine.scenario.scenario import load_scenario
     from tiengine.simulate import run as simulate
     from validation.msm.simulate import FullLength, run_full_length
 

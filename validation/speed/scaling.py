@@ -74,7 +74,7 @@ def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits  # here: the parent starts no Taichi
 
     from tiengine import backend
-    from tiengine.scenario import load_scenario
+    from tiengine.scenario.scenario import load_scenario
     from tiengine.setup import ingredients
     from validation.speed.bench import Bench, timed_in_turn
 
@@ -103,7 +103,7 @@ def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
 def measure_outputs(rounds: int, distance: float) -> dict[str, Any]:
     """Time of a step of whole runs [us], over the interval of all outputs and over the channels of a wheel."""
     from tiengine.result_files.channels import WHEEL
-    from tiengine.scenario import load_scenario
+    from tiengine.scenario.scenario import load_scenario
     from tiengine.simulate import run as simulate
 
     dt, names = 2e-4, list(WHEEL)

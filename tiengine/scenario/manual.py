@@ -1,6 +1,6 @@
 """What the manual has from declarations: the page on the keys of a scenario, the tables of channels.
 
-``python -m tiengine.reference docs`` brings docs/scenario.md and docs/results.md up to date; a test holds them to it.
+``python -m tiengine.scenario.manual docs`` brings docs/scenario.md and docs/results.md up to date; a test holds them to it.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from tiengine.fields import NumberOr
-from tiengine.parts import ProfilePoints
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION, GROUPS
 from tiengine.result_files.layout import GroupSpec
-from tiengine.scenario import Scenario
+from tiengine.scenario.key_checks import NumberOr
+from tiengine.scenario.parts import ProfilePoints
+from tiengine.scenario.scenario import Scenario
 from tiengine.track.fastening import Fastening
 from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail
@@ -40,7 +40,7 @@ changes one on the command line (`--set train.speed_kmh=300`), a dictionary in P
 the presets and where their numbers come from; the resolved scenario, with everything that was used, stands in each
 result file.
 
-This page is made from the declarations in the code (`python -m tiengine.reference docs`).
+This page is made from the declarations in the code (`python -m tiengine.scenario.manual docs`).
 """
 
 PARTS = """## Parts

@@ -15,15 +15,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from tiengine.contact.profile import ROUNDING_LENGTH, Profile
 from tiengine.contact.profile_files import MOST_POINTS, read_profile
 from tiengine.contact.profile_frame import placed
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.input_files import load_toml, numbers_of
-from tiengine.parameters.presets import KINDS, LONGEST_PATH, find_preset
+from tiengine.parameters.presets import KINDS, find_preset
 from tiengine.parameters.quantity import Name, Params, Q, Source, build
+from tiengine.scenario.part import Presets
 from tiengine.track.fastening import Fastening
 from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail
@@ -31,24 +32,9 @@ from tiengine.track.slab import Slab
 from tiengine.vehicle.vehicle import Vehicle, vehicle_from_table
 
 if TYPE_CHECKING:
-    from tiengine.sections import Track, Train
+    from tiengine.scenario.tables import Track, Train
 
-__all__ = ["Part", "Parts", "Presets", "build_parts", "collect_presets"]
-
-
-def _check_part(value: Any) -> Any:
-    if isinstance(value, str) and len(value) > LONGEST_PATH:
-        raise ValueError(f"must have at most {LONGEST_PATH} characters")
-    if not isinstance(value, str | dict) or not value:
-        raise ValueError("must be the name of a preset, the path of a file, or a table")
-    return value
-
-
-Part = Annotated[str | dict[str, Any], BeforeValidator(_check_part)]
-"""Name of a preset, path of a file, or a table, which may start from a preset: ``{like = "CHN60", ...}``."""
-
-Presets = dict[str, dict[str, dict[str, Any]]]
-"""Tables by kind and name."""
+__all__ = ["Parts", "build_parts", "collect_presets"]
 
 
 class ProfilePoints(Params):

@@ -9,10 +9,10 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from tiengine.fields import channel_names, check_speed, number_or
 from tiengine.parameters.quantity import Params, Q
-from tiengine.parts import Part
 from tiengine.result_files.channels import BODY, IRREGULARITY, WHEEL
+from tiengine.scenario.key_checks import channel_names, check_speed, number_or
+from tiengine.scenario.part import Part
 from tiengine.track.defects import FailedFastenings, MortarDefect
 from tiengine.vehicle.speed_programme import SpeedProfile
 

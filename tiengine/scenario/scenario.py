@@ -12,24 +12,25 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import tomli_w
 from pydantic import Field
 
-from tiengine.ensemble import Ensemble
-from tiengine.gauges import Gauge, check_gauges
 from tiengine.irregularity.irregularity import IrregularityParams
-from tiengine.overrides import Overrides, apply_overrides
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path
 from tiengine.parameters.presets import find_preset
 from tiengine.parameters.quantity import Params, PlainName, Source, build
-from tiengine.parts import Parts, build_parts, collect_presets
-from tiengine.result_files.events import Events
-from tiengine.sections import Contact, Numerics, Output, Track, Train
+from tiengine.scenario.ensemble import Ensemble
+from tiengine.scenario.event_policy import Events
+from tiengine.scenario.gauges import Gauge, check_gauges
+from tiengine.scenario.overrides import Overrides, apply_overrides
+from tiengine.scenario.parts import Parts, build_parts, collect_presets
+from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
 from tiengine.track.defects import check_defects
 from tiengine.track.mortar import MortarVoid
 
-__all__ = ["Scenario", "check_wavelength", "load_scenario", "to_toml"]
+__all__ = ["Scenario", "check_wavelength", "duration", "load_scenario", "to_toml"]
 
 WINDOW_MARGIN = 4.0  # m beyond the outer wheels, either end, of the window "auto", see Numerics
 WINDOW_MARGIN_LEAST = 2.0  # m: below this the window's fixed ends, or an absorbing zone, are felt by the outer wheels
@@ -105,7 +106,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
 
     Args:
         source: Name of a built-in scenario, path of a TOML file, tables, or a scenario.
-        overrides: ``{"train.speed_kmh": 300.0}`` or ``["train.speed_kmh=300"]`` (:mod:`tiengine.overrides`).
+        overrides: ``{"train.speed_kmh": 300.0}`` or ``["train.speed_kmh=300"]`` (:mod:`tiengine.scenario.overrides`).
 
     Returns:
         The scenario with its presets copied into it and its parts built.
@@ -286,3 +287,15 @@ def check_wavelength(scenario: Scenario, step: float) -> None:
                 f"irregularity.{key} = {wavelength:g}: must be at least 8 V dt = {least:.4g} m"
                 f" at a time step of {step:g} s; choose a smaller step or a longer wave"
             )
+
+
+def duration(train: Scenario) -> float:
+    """Time that the way of one train takes [s].
+
+    Args:
+        train: Its scenario.
+    """
+    start = train.rear + train.centre_in_window
+    x = np.linspace(start, start + train.train.distance, 200)
+    slowness = np.array([1.0 / train.train.speed.at(float(here))[0] for here in x])
+    return float(np.trapezoid(slowness, x))
