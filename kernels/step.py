@@ -188,7 +188,7 @@ def forces_and_contact(
     iterations_out: Ints2,
     wheel_record_out: Reals5,
 ):
-    """Everything explicit but the mortar; see the module. Array shapes as in ``tiengine.model`` and others.
+    """Everything explicit but the mortar; see the module. Array shapes as in ``tiengine.model.model`` and others.
 
     ``rows`` are the rows of displacement and velocity of the train in this pass.
     """

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tiengine.contact.hertz import hertz
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
-from tiengine.model import Model
+from tiengine.model.model import Model
 
 from .models import paper_model
 from .reference.contact_kernels import laws

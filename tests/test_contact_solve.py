@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tiengine.kernels import contact as kernels
 from tiengine.kernels import layout as at
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.start import ContactForces, evaluate_contact
 from tiengine.state import State
 

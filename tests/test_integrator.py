@@ -7,9 +7,10 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from tiengine.integrator import Newmark, inverse, seat_inverse_terms, seat_shapes
 from tiengine.kernels import layout as at
-from tiengine.model import Model
+from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes
+from tiengine.model.model import Model
+from tiengine.model.newmark import Newmark, inverse
 from tiengine.parameters.errors import InputError
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.state import State, positions
 from tiengine.track_static import StaticTrack
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tiengine.contact.table import ContactTable
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
-from tiengine.model import Model
+from tiengine.model.model import Model
 
 from .models import V350, paper_model
 from .wheelsets import (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tiengine.kernels import layout as at
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.state import State, positions
 
 from .models import V350, Run, paper_model

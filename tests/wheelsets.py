@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.start import ContactForces, evaluate_contact
 
 from .models import V350

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
 from tiengine.slot_extremes import SlotExtremes

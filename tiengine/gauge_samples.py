@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from tiengine.envelopes import watched_seats
 from tiengine.kernels import layout as at
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION
 from tiengine.result_files.layout import Block
 from tiengine.scenario.gauges import Gauge, nearest_seat, slab_under

@@ -21,7 +21,7 @@ from tiengine.irregularity.irregularity import Irregularity, check_reach, make_i
 from tiengine.kernels import layout as at
 from tiengine.memory import peak_memory
 from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.parameters.errors import InputError
 from tiengine.plan import Task
 from tiengine.prepare import prepare

@@ -7,13 +7,13 @@ from dataclasses import replace
 from functools import lru_cache
 
 from tiengine import backend
-from tiengine.integrator import Newmark
 from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
-from tiengine.model import Ingredients, Model, build_model
+from tiengine.model.from_scenario import ingredients
+from tiengine.model.model import Ingredients, Model, build_model
+from tiengine.model.newmark import Newmark
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario, check_wavelength, load_scenario, to_toml
 from tiengine.scenario.tables import Output
-from tiengine.setup import ingredients
 from tiengine.stability import TOLERATED_GROWTH, energy_growth
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper

@@ -13,7 +13,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper
 

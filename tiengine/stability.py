@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.state import State
 from tiengine.stepper import Stepper
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tiengine.kernels import contact as kernels
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import N_CONTACT
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.parameters.errors import InputError
 from tiengine.state import State, positions
 from tiengine.track_static import StaticTrack

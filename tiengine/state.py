@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import COS, N_CONTACT
-from tiengine.model import Model
+from tiengine.model.model import Model
 
 __all__ = ["Position", "State", "positions"]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tiengine.kernels import layout as at
 from tiengine.kernels import step as kernels
 from tiengine.launch import Launch
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.scratch import Scratch
 from tiengine.state import State, positions
 

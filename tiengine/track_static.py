@@ -13,7 +13,7 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.state import State
 
 __all__ = ["StaticTrack"]

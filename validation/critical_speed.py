@@ -27,9 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import WheelRailPair
+from tiengine.model.from_scenario import ingredients
 from tiengine.parameters.errors import RunFailedError
 from tiengine.scenario.scenario import Scenario, load_scenario
-from tiengine.setup import ingredients
 from tiengine.simulate import run
 from tiengine.vehicle.train import TrainModel, static_wheel_loads
 from validation.case import Case

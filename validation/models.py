@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
-from tiengine.model import Model, build_model
+from tiengine.model.from_scenario import ingredients
+from tiengine.model.model import Model, build_model
 from tiengine.scenario.scenario import load_scenario
-from tiengine.setup import ingredients
 
 __all__ = ["paper_model"]
 

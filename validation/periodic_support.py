@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from tiengine.integrator import Newmark
 from tiengine.kernels import layout as at
-from tiengine.model import Ingredients, Model, build_model
+from tiengine.model.from_scenario import ingredients
+from tiengine.model.model import Ingredients, Model, build_model
+from tiengine.model.newmark import Newmark
 from tiengine.scenario.scenario import load_scenario
-from tiengine.setup import ingredients
 from tiengine.state import State
 from tiengine.stepper import Chunk, Stepper
 from tiengine.track.rail import RailWindow

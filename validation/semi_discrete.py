@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tiengine.irregularity.irregularity import Irregularity
 from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
-from tiengine.model import Model
+from tiengine.model.model import Model
 from tiengine.start import ContactForces, evaluate_contact
 from tiengine.state import State
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from tiengine.integrator import Newmark
+from tiengine.model.newmark import Newmark
 from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import Rail, RailWindow
 from validation.case import Case

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from tiengine import backend
+from tiengine.model.from_scenario import ingredients
 from tiengine.scenario.scenario import load_scenario
-from tiengine.setup import ingredients
 from tiengine.simulate import run
 from tiengine.vehicle.train import assemble, static_wheel_loads
 from validation.case import Case

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
-from tiengine.integrator import Newmark
 from tiengine.irregularity.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
-from tiengine.model import CONTACT_TOLERANCE, Ingredients
+from tiengine.model.model import CONTACT_TOLERANCE, Ingredients
+from tiengine.model.newmark import Newmark
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.fastening import Fastening

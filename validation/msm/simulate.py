@@ -13,12 +13,12 @@ from threadpoolctl import threadpool_limits
 
 from tiengine import backend
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
+from tiengine.model.from_scenario import ingredients
 from tiengine.parameters.errors import InputError
 from tiengine.recorder import Recorder, Samples
 from tiengine.result_files.reader import Result
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
-from tiengine.setup import ingredients
 from tiengine.simulate import Progress
 from validation.msm.model import FullTrack, build_track
 from validation.msm.start import steady_rolling

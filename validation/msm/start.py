@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
-from tiengine.model import Ingredients, build_model
+from tiengine.model.model import Ingredients, build_model
 from tiengine.scenario.scenario import Scenario
 from tiengine.start import equilibrium
 from tiengine.state import State

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
-from tiengine.model import Ingredients, build_model
+from tiengine.model.model import Ingredients, build_model
 from tiengine.recorder import Recorder
 from tiengine.scenario.scenario import Scenario
 from tiengine.start import equilibrium

@@ -74,8 +74,8 @@ def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits  # here: the parent starts no Taichi
 
     from tiengine import backend
+    from tiengine.model.from_scenario import ingredients
     from tiengine.scenario.scenario import load_scenario
-    from tiengine.setup import ingredients
     from validation.speed.bench import Bench, timed_in_turn
 
     backend.start()

@@ -14,11 +14,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from tiengine.blocks import Blocks
 from tiengine.contact.table import ContactTable
-from tiengine.integrator import Newmark, inverse, seat_inverse_terms, seat_shapes, smearing
 from tiengine.irregularity.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
+from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes, smearing
+from tiengine.model.newmark import Newmark, inverse
+from tiengine.model.speed_blocks import Blocks
 from tiengine.track.fastening import Fastening, seat_count, seat_tables
 from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail, RailWindow, sine_products

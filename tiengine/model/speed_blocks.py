@@ -8,7 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from tiengine.integrator import Newmark, inverse, rail_inverses
+from tiengine.model.implicit_seats import rail_inverses
+from tiengine.model.newmark import Newmark, inverse
 from tiengine.track.fastening import Fastening
 from tiengine.track.rail import RailWindow
 from tiengine.vehicle.train import TrainModel

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table_cache import contact_table
-from tiengine.integrator import Newmark
-from tiengine.model import Ingredients, SlabDesigns
+from tiengine.model.model import Ingredients, SlabDesigns
+from tiengine.model.newmark import Newmark
 from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.defects import fastening_factors

@@ -1,0 +1,1 @@
+"""The constant data of a run, assembled and factorised."""
