@@ -65,7 +65,7 @@ def prepare(
     slab_factor_out: Reals3,
     rail_predicted_out: Reals4,
 ):
-    """What the predictors are needed for; see the module. Shapes as in ``tiengine.scratch``."""
+    """What the predictors are needed for; see the module. Shapes as in ``tiengine.engine.scratch``."""
     ti.loop_config(serialize=True)
     for _ in range(1):  # one set of seat shapes for all trains
         fs.seat_shapes(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tiengine import backend
+from tiengine.engine import backend
 
 sys.path.append(
     str(Path(__file__).parents[1])

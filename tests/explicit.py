@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 
 LIFTED = -1.0  # m
 

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.equilibrium import equilibrium
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
 from tiengine.scenario.scenario import load_scenario
-from tiengine.start import equilibrium
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 
 V350 = 350.0 / 3.6
 """m/s: the paper's speed."""

@@ -81,7 +81,7 @@ def test_files_fit_a_reader(path):
 
 @pytest.mark.parametrize("path", DEVICE, ids=lambda p: p.stem)
 def test_kernels_write_only_what_their_signature_says(path):
-    """A kernel stores into ``*_out``, ``motion`` or scratch that ``tiengine.state`` owns, never into constants."""
+    """A kernel stores into ``*_out``, ``motion`` or scratch that ``tiengine.engine.state`` owns, never into constants."""
     constants = {
         "dims",
         "constants",

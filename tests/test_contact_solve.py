@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tiengine.engine.equilibrium import ContactForces, evaluate_contact
+from tiengine.engine.state import State
 from tiengine.kernels import contact as kernels
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
-from tiengine.start import ContactForces, evaluate_contact
-from tiengine.state import State
 
 from .models import V350, Run, paper_model
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tiengine.engine.stepper import Stepper
 from tiengine.envelopes import SeatEnvelopes, SlabEnvelopes, watched_seats
 from tiengine.kernels import layout as at
 from tiengine.scenario.scenario import load_scenario
-from tiengine.stepper import Stepper
 from tiengine.track.plate_shapes import moment_operator
 
 from .models import V350, Run, paper_model

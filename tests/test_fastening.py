@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tiengine.engine.state import State, positions
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
-from tiengine.state import State, positions
 from tiengine.track.fastening import seat_count, seat_tables
 
 from .explicit import Explicit

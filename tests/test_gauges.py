@@ -7,12 +7,12 @@ import tomllib
 import numpy as np
 import pytest
 
+from tiengine.engine.state import State
 from tiengine.gauge_samples import RailPlace, SlabPlace
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.gauges import nearest_seat, slab_under
 from tiengine.scenario.scenario import load_scenario, to_toml
-from tiengine.state import State
 
 from .models import paper_model
 

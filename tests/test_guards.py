@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from tiengine import simulate
+from tiengine.engine.state import State
 from tiengine.guards import Guard, climbing_shift
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import SHIFT
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.scenario.event_policy import Events
 from tiengine.scenario.scenario import Scenario, load_scenario
-from tiengine.state import State
 
 from .reference.marching import model_of
 

@@ -7,13 +7,13 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes
 from tiengine.model.model import Model
 from tiengine.model.newmark import Newmark, inverse
 from tiengine.parameters.errors import InputError
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 
 from .models import V350, paper_model
 

@@ -7,11 +7,11 @@ import pytest
 import scipy.linalg as la
 from numpy.typing import NDArray
 
+from tiengine.engine.state import State, positions
 from tiengine.kernels import layout as at
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset
 from tiengine.parameters.quantity import build
-from tiengine.state import State, positions
 from tiengine.track.rail import Rail, RailWindow, sine_products
 
 from .explicit import Explicit

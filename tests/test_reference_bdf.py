@@ -11,9 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from threadpoolctl import threadpool_limits
 
+from tiengine.engine.equilibrium import equilibrium
+from tiengine.engine.state import State
 from tiengine.irregularity.irregularity import make_irregularity
-from tiengine.start import equilibrium
-from tiengine.state import State
 from validation.bdf import RTOL, SHORT, SIZES, STEPS
 from validation.semi_discrete import SemiDiscrete
 

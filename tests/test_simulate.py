@@ -10,10 +10,10 @@ import xarray
 from numpy.typing import NDArray
 
 from tiengine import simulate
+from tiengine.engine.state import State
+from tiengine.engine.static_track import StaticTrack
 from tiengine.kernels import layout as at
 from tiengine.scenario.scenario import load_scenario
-from tiengine.state import State
-from tiengine.track_static import StaticTrack
 
 from .reference.marching import KMH, March, march, model_of
 

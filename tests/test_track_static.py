@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tiengine.engine.state import State, positions
+from tiengine.engine.static_track import StaticTrack
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
-from tiengine.state import State, positions
-from tiengine.track_static import StaticTrack
 
 from .explicit import Explicit
 from .models import V350, paper_model

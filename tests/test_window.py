@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tiengine.engine.state import State, positions
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
-from tiengine.state import State, positions
 
 from .models import V350, Run, paper_model
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.equilibrium import ContactForces, evaluate_contact
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
 from tiengine.model.model import Model
-from tiengine.start import ContactForces, evaluate_contact
 
 from .models import V350
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.result_files.layout import Block
-from tiengine.stepper import Stepper
 from tiengine.track.plate_shapes import W, element_dofs, locate, tabulate_shapes
 from tiengine.track.slab import Slab
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
 from tiengine.slot_extremes import SlotExtremes
-from tiengine.state import State
-from tiengine.stepper import Stepper
 from tiengine.track.plate_shapes import moment_operator
 
 __all__ = ["SeatEnvelopes", "SlabEnvelopes", "watched_seats"]

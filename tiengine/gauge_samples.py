@@ -17,14 +17,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Stepper
 from tiengine.envelopes import watched_seats
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION
 from tiengine.result_files.layout import Block
 from tiengine.scenario.gauges import Gauge, nearest_seat, slab_under
-from tiengine.state import State
-from tiengine.stepper import Stepper
 from tiengine.track.plate_shapes import W, shapes_at
 
 __all__ = ["GaugeSamples", "gauge_samples"]

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
+from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import SHIFT
 from tiengine.result_files.channels import DOFS, SIDES
 from tiengine.result_files.events import EVENT_KINDS, Event
 from tiengine.scenario.event_policy import Events
-from tiengine.stepper import Stepper
 
 __all__ = ["Guard", "Watch"]
 

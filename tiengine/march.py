@@ -16,6 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.equilibrium import equilibrium, release
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.time_step import prepare
 from tiengine.guards import Guard
 from tiengine.irregularity.irregularity import Irregularity, check_reach, make_irregularity
 from tiengine.kernels import layout as at
@@ -24,14 +28,10 @@ from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paus
 from tiengine.model.model import Model
 from tiengine.parameters.errors import InputError
 from tiengine.plan import Task
-from tiengine.prepare import prepare
 from tiengine.recorder import Recorder
 from tiengine.result_files.checkpoint import Checkpoint
 from tiengine.result_files.layout import Block, TrainLabels
 from tiengine.scenario.scenario import Scenario
-from tiengine.start import equilibrium, release
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 from tiengine.trackside import Trackside
 
 __all__ = ["CHUNK_STEPS", "Run", "march", "never"]

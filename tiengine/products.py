@@ -13,9 +13,9 @@ from unittest.mock import patch
 
 import numpy as np
 
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.model.model import Model
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 
 __all__ = ["Work", "count_products", "work_of"]
 

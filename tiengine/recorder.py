@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.stepper import Chunk
 from tiengine.kernels import layout as at
 from tiengine.result_files.channels import MORTAR
 from tiengine.result_files.layout import DTYPES
 from tiengine.result_files.writer import Block, GroupSpec, TrainLabels, Writer
 from tiengine.scenario.scenario import Scenario
-from tiengine.stepper import Chunk
 from tiengine.vehicle.train import TrainModel
 
 __all__ = ["Recorder", "Samples"]

@@ -13,12 +13,12 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from tiengine.disk_space import check_space
+from tiengine.engine.time_step import AUTO_STEPS, prepare
 from tiengine.gather import Gathering, Progress, Tell
 from tiengine.march import march, never
 from tiengine.messages import Message
 from tiengine.parameters.errors import InputError, RunFailedError, RunStoppedError
 from tiengine.plan import Task, plan
-from tiengine.prepare import AUTO_STEPS, prepare
 from tiengine.recorder import Recorder
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
 from tiengine.result_files.layout import GroupSpec

@@ -13,7 +13,7 @@ __all__ = ["SlotExtremes"]
 
 @dataclass(eq=False)
 class SlotExtremes:
-    """Running extremes by slot (see :mod:`tiengine.state`); slabs that leave are reduced and put aside.
+    """Running extremes by slot (see :mod:`tiengine.engine.state`); slabs that leave are reduced and put aside.
 
     Attributes:
         largest, smallest: Of the slab in each slot, shape (B, slots, points).

@@ -13,11 +13,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
 from tiengine.model.model import Model
-from tiengine.state import State
-from tiengine.stepper import Stepper
 
 __all__ = ["contact_us", "suspension_us"]
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.stepper import Stepper
 from tiengine.guards import Guard
 from tiengine.irregularity.irregularity import Irregularity
 from tiengine.march import CHUNK_STEPS
@@ -19,7 +20,6 @@ from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recorder import Recorder
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario
-from tiengine.stepper import Stepper
 from tiengine.trackside import Trackside
 
 __all__ = ["REST", "StageTimers", "TimedLoop", "Times", "shown"]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.deflection import Deflection
+from tiengine.engine.stepper import Stepper
 from tiengine.envelopes import SeatEnvelopes, SlabEnvelopes
 from tiengine.gauge_samples import gauge_samples
 from tiengine.kernels import layout as at
@@ -22,7 +23,6 @@ from tiengine.result_files.channels import DEFLECTION, GAUGE_FORCE, GAUGE_MOTION
 from tiengine.result_files.layout import DTYPES, Block, GroupSpec
 from tiengine.scenario.gauges import Gauge, nearest_seat
 from tiengine.scenario.scenario import Scenario
-from tiengine.stepper import Stepper
 from tiengine.track.slab import Slab
 
 __all__ = ["Trackside", "Watcher", "trackside_groups"]

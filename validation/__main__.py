@@ -9,7 +9,7 @@ import click
 from rich.console import Console
 from rich.progress import Progress
 
-from tiengine import backend
+from tiengine.engine import backend
 from tiengine.scenario.scenario import load_scenario
 from validation.case import Outcome, evaluate
 from validation.table import headlines, insert, keep, markdown, show

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from tiengine.engine.equilibrium import equilibrium
+from tiengine.engine.state import State
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulate import prepare
-from tiengine.start import equilibrium
-from tiengine.state import State
 from validation.case import Case
 from validation.runs import simulate
 from validation.semi_discrete import SemiDiscrete

@@ -13,9 +13,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.equilibrium import ContactForces, evaluate_contact
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
-from tiengine.start import ContactForces, evaluate_contact
 from validation.case import Case
 from validation.models import paper_model
 

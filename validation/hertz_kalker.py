@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from tiengine.contact.hertz import hertz, zhai_G
 from tiengine.contact.kalker import kalker
 from tiengine.contact.search import transverse_curvature
+from tiengine.engine.equilibrium import evaluate_contact
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
-from tiengine.start import evaluate_contact
 from validation.case import Case
 from validation.manchester import CONTACT, R0, REFERENCE, placed
 from validation.models import paper_model

@@ -15,7 +15,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from tiengine import backend
+from tiengine.engine import backend
 from validation.comparison import (
     ABSORBING,
     COARSE_STEP,

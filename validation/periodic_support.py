@@ -25,13 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
 from tiengine.scenario.scenario import load_scenario
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 from tiengine.track.rail import RailWindow
 from validation.case import Case
 from validation.closed_forms.floquet import Seats, deflection_under_load, jump, seat_force

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
+from tiengine.engine.stability import TOLERATED_GROWTH, energy_growth
 from tiengine.scenario.scenario import load_scenario
-from tiengine.stability import TOLERATED_GROWTH, energy_growth
 from tiengine.vehicle.train import static_wheel_loads
 from validation.case import Case
 from validation.models import paper_model

@@ -12,12 +12,12 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
+from tiengine.engine.equilibrium import ContactForces, evaluate_contact
+from tiengine.engine.state import State
 from tiengine.irregularity.irregularity import Irregularity
 from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
 from tiengine.model.model import Model
-from tiengine.start import ContactForces, evaluate_contact
-from tiengine.state import State
 
 NUDGE = np.concatenate([np.full(5, 1e-9), np.full(5, 1e-7), np.full(18, 1e-9)])
 """Steps for the contact's derivatives: wheelset u and du/dt, then w, v, theta_x, slopes, rates of either rail."""

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tiengine.engine.equilibrium import equilibrium
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.kernels import layout as at
-from tiengine.start import equilibrium
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 from tiengine.vehicle.train import static_wheel_loads
 from validation.case import Case
 from validation.models import paper_model

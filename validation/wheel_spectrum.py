@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from tiengine import backend
+from tiengine.engine import backend
 from tiengine.model.from_scenario import ingredients
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulate import run

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tiengine.engine.equilibrium import equilibrium
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.simulate import prepare as prepare_window
-from tiengine.start import equilibrium
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 from validation.case import Case
 from validation.comparison import ALL_MODES, PER_METRE, difference
 from validation.msm.simulate import FullLength, load

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tiengine.engine.equilibrium import equilibrium, release
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
 from tiengine.scenario.scenario import Scenario, load_scenario
-from tiengine.start import equilibrium, release
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 
 KMH = 1.0 / 3.6
 CHUNK = 500

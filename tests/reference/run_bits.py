@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import taichi as ti
 
-from tiengine import backend
+from tiengine.engine import backend
 
 
 def main(threads: int, optimised: bool, steps: int) -> None:

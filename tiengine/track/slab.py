@@ -2,7 +2,7 @@
 
 DOFs of a slab: (w, dw/dx, dw/dy) of every node, node (ix, iy) being number ix (elements_y + 1) + iy, then the
 lateral displacement y and the yaw psi of its centre. x forward, y right, w down; side index 0 left, 1 right.
-The matrices come from the Taichi kernels of ``kernels/plate.py``, so :func:`tiengine.backend.start` must have
+The matrices come from the Taichi kernels of ``kernels/plate.py``, so :func:`tiengine.engine.backend.start` must have
 been called.
 """
 

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from tiengine import march, prepare, simulate
+from tiengine import march, simulate
+from tiengine.engine import time_step as prepare
 from tiengine.guards import LIMITS
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from tiengine import backend
+from tiengine.engine import backend
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.model.from_scenario import ingredients
 from tiengine.parameters.errors import InputError

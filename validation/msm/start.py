@@ -16,11 +16,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.equilibrium import equilibrium
+from tiengine.engine.state import State
 from tiengine.kernels import layout as at
 from tiengine.model.model import Ingredients, build_model
 from tiengine.scenario.scenario import Scenario
-from tiengine.start import equilibrium
-from tiengine.state import State
 from validation.msm.model import FullTrack
 from validation.msm.step import FullState
 

@@ -15,9 +15,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from tiengine.engine.launch import Launch
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import COS, N_CONTACT
-from tiengine.launch import Launch
 from tiengine.model.newmark import inverse
 from validation.msm import kernels
 from validation.msm.model import CL, CV, KL, KV, FullTrack

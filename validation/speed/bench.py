@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from tiengine.engine.equilibrium import equilibrium
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.model.model import Ingredients, build_model
 from tiengine.recorder import Recorder
 from tiengine.scenario.scenario import Scenario
-from tiengine.start import equilibrium
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 from tiengine.timed_loop import StageTimers, Times
 
 __all__ = ["Bench", "timed_in_turn"]

@@ -73,7 +73,7 @@ def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
     """Time of a step at every value of an axis [us], and what of it is largest at the last."""
     from threadpoolctl import threadpool_limits  # here: the parent starts no Taichi
 
-    from tiengine import backend
+    from tiengine.engine import backend
     from tiengine.model.from_scenario import ingredients
     from tiengine.scenario.scenario import load_scenario
     from validation.speed.bench import Bench, timed_in_turn

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.launch import Launch
+from tiengine.engine.scratch import Scratch
+from tiengine.engine.state import State, positions
 from tiengine.kernels import layout as at
 from tiengine.kernels import step as kernels
-from tiengine.launch import Launch
 from tiengine.model.model import Model
-from tiengine.scratch import Scratch
-from tiengine.state import State, positions
 
 __all__ = ["Chunk", "Stepper"]
 

@@ -12,9 +12,9 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
+from tiengine.engine.state import State
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
-from tiengine.state import State
 
 __all__ = ["StaticTrack"]
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.state import State, positions
+from tiengine.engine.static_track import StaticTrack
 from tiengine.kernels import contact as kernels
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import N_CONTACT
 from tiengine.model.model import Model
 from tiengine.parameters.errors import InputError
-from tiengine.state import State, positions
-from tiengine.track_static import StaticTrack
 
 __all__ = ["ContactForces", "equilibrium", "evaluate_contact", "release"]
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 
 __all__ = ["energy_growth", "is_stable"]
 

@@ -6,7 +6,10 @@ import tomllib
 from dataclasses import replace
 from functools import lru_cache
 
-from tiengine import backend
+from tiengine.engine import backend
+from tiengine.engine.stability import TOLERATED_GROWTH, energy_growth
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
@@ -14,9 +17,6 @@ from tiengine.model.newmark import Newmark
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario, check_wavelength, load_scenario, to_toml
 from tiengine.scenario.tables import Output
-from tiengine.stability import TOLERATED_GROWTH, energy_growth
-from tiengine.state import State
-from tiengine.stepper import Chunk, Stepper
 
 __all__ = ["AUTO_STEPS", "prepare"]
 

@@ -1,0 +1,1 @@
+"""The changing data of a run and the time step."""
