@@ -11,8 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from tiengine.engine.stepper import Stepper
-from tiengine.envelopes import SeatEnvelopes, SlabEnvelopes, watched_seats
 from tiengine.kernels import layout as at
+from tiengine.recording.seat_envelopes import SeatEnvelopes, watched_seats
+from tiengine.recording.slab_envelopes import SlabEnvelopes
 from tiengine.scenario.scenario import load_scenario
 from tiengine.track.plate_shapes import moment_operator
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tiengine.engine.state import State
-from tiengine.gauge_samples import RailPlace, SlabPlace
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
+from tiengine.recording.gauge_samples import RailPlace, SlabPlace
 from tiengine.scenario.gauges import nearest_seat, slab_under
 from tiengine.scenario.scenario import load_scenario, to_toml
 

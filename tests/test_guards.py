@@ -9,10 +9,10 @@ import pytest
 
 from tiengine import simulate
 from tiengine.engine.state import State
-from tiengine.guards import Guard, climbing_shift
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import SHIFT
 from tiengine.parameters.errors import InputError, RunFailedError
+from tiengine.recording.guards import Guard, climbing_shift
 from tiengine.scenario.event_policy import Events
 from tiengine.scenario.scenario import Scenario, load_scenario
 

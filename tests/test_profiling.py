@@ -13,12 +13,12 @@ from click.testing import CliRunner
 
 from tiengine import products, profiling, timed_loop
 from tiengine.cli import main
-from tiengine.guards import Guard
 from tiengine.kernels import layout as at
 from tiengine.machine import cache_bytes
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.products import count_products
 from tiengine.profile_report import ProfileReport, compare, read_json
+from tiengine.recording.guards import Guard
 from tiengine.result_files.events import Event
 from tiengine.roofs import Roofs
 from tiengine.scenario.scenario import load_scenario

@@ -6,13 +6,13 @@ import math
 import shutil
 from pathlib import Path
 
-from tiengine.deflection import window_points
 from tiengine.parameters.errors import InputError
-from tiengine.recorder import Recorder
+from tiengine.recording.deflection import window_points
+from tiengine.recording.recorder import Recorder
+from tiengine.recording.trackside import trackside_groups
 from tiengine.result_files.channels import DOFS
 from tiengine.result_files.layout import CHUNK
 from tiengine.scenario.scenario import Scenario, duration
-from tiengine.trackside import trackside_groups
 
 __all__ = ["check_space", "estimated_bytes"]
 

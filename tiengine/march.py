@@ -20,7 +20,6 @@ from tiengine.engine.equilibrium import equilibrium, release
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.engine.time_step import prepare
-from tiengine.guards import Guard
 from tiengine.irregularity.irregularity import Irregularity, check_reach, make_irregularity
 from tiengine.kernels import layout as at
 from tiengine.memory import peak_memory
@@ -28,11 +27,12 @@ from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paus
 from tiengine.model.model import Model
 from tiengine.parameters.errors import InputError
 from tiengine.plan import Task
-from tiengine.recorder import Recorder
+from tiengine.recording.guards import Guard
+from tiengine.recording.recorder import Recorder
+from tiengine.recording.trackside import Trackside
 from tiengine.result_files.checkpoint import Checkpoint
 from tiengine.result_files.layout import Block, TrainLabels
 from tiengine.scenario.scenario import Scenario
-from tiengine.trackside import Trackside
 
 __all__ = ["CHUNK_STEPS", "Run", "march", "never"]
 

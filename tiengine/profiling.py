@@ -25,12 +25,12 @@ from tiengine.parameters.errors import InputError
 from tiengine.plan import Task, plan
 from tiengine.products import Work, count_products
 from tiengine.profile_report import Loop, Memory, ProfileReport, Rate, Stage, Wall
+from tiengine.recording.trackside import trackside_groups
 from tiengine.result_files.writer import Writer
 from tiengine.roofs import Roofs, measure_roofs
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.stage_split import contact_us, suspension_us
 from tiengine.timed_loop import REST, StageTimers, TimedLoop, Times, shown
-from tiengine.trackside import trackside_groups
 
 __all__ = ["array_bytes", "profile"]
 

@@ -19,7 +19,8 @@ from tiengine.march import march, never
 from tiengine.messages import Message
 from tiengine.parameters.errors import InputError, RunFailedError, RunStoppedError
 from tiengine.plan import Task, plan
-from tiengine.recorder import Recorder
+from tiengine.recording.recorder import Recorder
+from tiengine.recording.trackside import trackside_groups
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
 from tiengine.result_files.layout import GroupSpec
 from tiengine.result_files.output_file import check_output
@@ -28,7 +29,6 @@ from tiengine.result_files.reader import open as open_result
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.simulation import IMPORT_BEGAN
-from tiengine.trackside import trackside_groups
 from tiengine.worker import distribute
 
 IMPORT_SECONDS = time.perf_counter() - IMPORT_BEGAN

@@ -12,9 +12,9 @@ import numpy as np
 
 from tiengine import march, simulate
 from tiengine.engine import time_step as prepare
-from tiengine.guards import LIMITS
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
+from tiengine.recording.guards import LIMITS
 from tiengine.scenario.scenario import load_scenario
 from validation.faults.contents import Contents, contents
 from validation.faults.plan import SEED

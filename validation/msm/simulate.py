@@ -15,7 +15,7 @@ from tiengine.engine import backend
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.model.from_scenario import ingredients
 from tiengine.parameters.errors import InputError
-from tiengine.recorder import Recorder, Samples
+from tiengine.recording.recorder import Recorder, Samples
 from tiengine.result_files.reader import Result
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml

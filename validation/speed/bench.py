@@ -14,7 +14,7 @@ from tiengine.engine.state import State
 from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.model.model import Ingredients, build_model
-from tiengine.recorder import Recorder
+from tiengine.recording.recorder import Recorder
 from tiengine.scenario.scenario import Scenario
 from tiengine.timed_loop import StageTimers, Times
 

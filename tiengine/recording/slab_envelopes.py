@@ -1,135 +1,87 @@
-"""Extremes of every seat and slab over a whole run.
-
-Running extremes are kept of what the window holds. A seat or slab that it leaves behind is put aside and goes to the
-file with the chunk; at the end of the run so do those still in the window, some of which the train has not passed.
-"""
+"""Extremes of what is seen of every slab while it is in memory, in arrays of the window's size."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State
 from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
-from tiengine.slot_extremes import SlotExtremes
 from tiengine.track.plate_shapes import moment_operator
 
-__all__ = ["SeatEnvelopes", "SlabEnvelopes", "watched_seats"]
-
-Reals = NDArray[np.float64]
-
-
-def watched_seats(model: Model) -> tuple[int, int]:
-    """Places of the window (first, end) where forces are those of fastenings alone.
-
-    Whatever the phase 0 < s_0 <= d of the seats, those in these places stand inside the window and outside its
-    absorbing zones, where springs to the ground add to the forces on the rail.
-    """
-    zone, length, spacing = (float(model.constants[i]) for i in (at.ABSORBING_ZONE, at.LENGTH, at.SPACING))
-    return math.ceil(zone / spacing - 1e-9), math.floor((length - zone) / spacing + 1e-9)
+__all__ = ["SlabEnvelopes", "SlotExtremes"]
 
 
 @dataclass(eq=False)
-class SeatEnvelopes:
-    """Extremes of the fastenings' forces over every step.
+class SlotExtremes:
+    """Running extremes by slot (see :mod:`tiengine.engine.state`); slabs that leave are reduced and put aside.
 
     Attributes:
-        model, state: What is watched.
-        largest, smallest: Of the seat at each place of the window, shape (B, 2, 3, seats), rows as
-            ``State.seat_force``; places before the watched ones hold nothing of use.
-        first_seat: Rear seat, -1 before the first step.
+        largest, smallest: Of the slab in each slot, shape (B, slots, points).
+        starts: First point of each quantity; a quantity's points are reduced to one when a slab leaves.
+        first_slab: Rear slab, -1 before the first sample.
     """
 
-    model: Model
-    state: State
-    largest: Reals
-    smallest: Reals
-    first_seat: int = -1
-    _left: list[tuple[int, Reals]] = field(default_factory=list)
+    largest: NDArray[np.float64]
+    smallest: NDArray[np.float64]
+    starts: tuple[int, ...] = (0,)
+    first_slab: int = -1
+    _left: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list)
 
     @classmethod
-    def of(cls, stepper: Stepper) -> SeatEnvelopes:
+    def of(cls, trains: int, slots: int, points: int, starts: tuple[int, ...] = (0,)) -> SlotExtremes:
         """Nothing seen yet."""
-        state = stepper.state
-        return cls(
-            stepper.model, state, np.full_like(state.seat_force, -np.inf), np.full_like(state.seat_force, np.inf)
-        )
+        shape = (trains, slots, points)
+        return cls(np.full(shape, -np.inf), np.full(shape, np.inf), starts)
 
-    @property
-    def stage(self) -> str:
-        """What its part of a step is called."""
-        return "envelopes"
+    def move(self, first_slab: int) -> None:
+        """Put aside the slabs behind a new rear slab; their slots begin anew."""
+        if first_slab == self.first_slab:
+            return
+        slots = self.largest.shape[1]
+        for slab in range(self.first_slab, min(first_slab, self.first_slab + slots)) if self.first_slab >= 0 else ():
+            largest, smallest = self.largest[:, slab % slots], self.smallest[:, slab % slots]
+            reduced = np.maximum.reduceat(largest, self.starts, -1), np.minimum.reduceat(smallest, self.starts, -1)
+            self._left.append((slab, np.stack(reduced)))
+            largest[:], smallest[:] = -np.inf, np.inf
+        self.first_slab = first_slab
 
-    def watch(self) -> None:
-        """Take in the forces of a step."""
-        if self.state.first_seat != self.first_seat:
-            self._move(self.state.first_seat)
-        np.maximum(self.largest, self.state.seat_force, out=self.largest)
-        np.minimum(self.smallest, self.state.seat_force, out=self.smallest)
+    def add(self, largest: NDArray[np.float64], smallest: NDArray[np.float64]) -> None:
+        """Take in what was seen.
 
-    def blocks(self, time: Reals, position: Reals) -> list[Block]:
-        """Seats that were left behind, train by train; neither times nor positions matter."""
+        Args:
+            largest: Largest values of the slabs in all slots since the last call, shape (B, slots, points).
+            smallest: Smallest values.
+        """
+        np.maximum(self.largest, largest, out=self.largest)
+        np.minimum(self.smallest, smallest, out=self.smallest)
+
+    def take(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Slabs put aside since the last call: their indices (n,), largest and smallest (B, n, quantities)."""
         left, self._left = self._left, []
-        none = np.empty((2, *self.largest.shape[:-1], 0))
-        seats = np.concatenate([np.arange(0), *(first + np.arange(found.shape[-1]) for first, found in left)])
-        largest, smallest = np.concatenate([none, *(found for _, found in left)], axis=-1)
-        factor = np.concatenate([np.ones((0, 2)), *(self.model.given.seat_factors(int(seat), 1) for seat in seats)])
-        chainage: Reals = (seats + 0.5) * float(self.model.constants[at.SPACING])
-        return [
-            Block(
-                seats,
-                chainage,
-                {
-                    "largest_vertical_force": largest[b, :, 0].T,
-                    "smallest_vertical_force": smallest[b, :, 0].T,
-                    "largest_lateral_force": largest[b, :, 1].T,
-                    "smallest_lateral_force": smallest[b, :, 1].T,
-                    "factor": factor,
-                },
-            )
-            for b in range(len(largest))
-        ]
+        none = np.empty((2, len(self.largest), 0, len(self.starts)))
+        largest, smallest = np.concatenate([none, *(extremes[:, :, None] for _, extremes in left)], axis=2)
+        return np.array([slab for slab, _ in left], dtype=np.int64), largest, smallest
 
-    def rest(self) -> list[Block]:
-        """Seats still in the window."""
-        first, end = watched_seats(self.model)
-        if self.first_seat >= 0:
-            self._put_aside(end - first)
-        return self.blocks(np.zeros(0), np.zeros(0))
+    def leave(self) -> None:
+        """Put aside all slabs."""
+        if self.first_slab >= 0:
+            self.move(self.first_slab + self.largest.shape[1])
 
-    def saved(self) -> dict[str, Reals]:
-        """What the coming seats depend on, when nothing is put aside."""
-        return {"largest": self.largest, "smallest": self.smallest, "first": np.array(float(self.first_seat))}
+    def saved(self) -> dict[str, NDArray[np.float64]]:
+        """What the coming slabs depend on, when nothing is put aside."""
+        return {"largest": self.largest, "smallest": self.smallest, "first": np.array(float(self.first_slab))}
 
-    def restore(self, saved: Mapping[str, Reals]) -> None:
+    def restore(self, saved: Mapping[str, NDArray[np.float64]]) -> None:
         """Go on from what :meth:`saved` gave."""
         self.largest[:], self.smallest[:] = saved["largest"], saved["smallest"]
-        self.first_seat = int(saved["first"])
-
-    def _put_aside(self, count: int) -> None:
-        """The rear ``count`` of the watched seats."""
-        first, _ = watched_seats(self.model)
-        rear = slice(first, first + count)
-        self._left.append((self.first_seat + first, np.stack([self.largest[..., rear], self.smallest[..., rear]])))
-
-    def _move(self, first_seat: int) -> None:
-        """Shift the seats to their new places; those that come to be watched begin anew."""
-        _, end = watched_seats(self.model)
-        passed = first_seat - self.first_seat
-        if self.first_seat >= 0:
-            self._put_aside(passed)
-            for array, nothing in ((self.largest, -np.inf), (self.smallest, np.inf)):
-                array[..., :-passed] = array[..., passed:]
-                array[..., end - passed :] = nothing
-        self.first_seat = first_seat
+        self.first_slab = int(saved["first"])
 
 
 @dataclass(eq=False)

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Stepper
-from tiengine.envelopes import watched_seats
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
+from tiengine.recording.seat_envelopes import watched_seats
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION
 from tiengine.result_files.layout import Block
 from tiengine.scenario.gauges import Gauge, nearest_seat, slab_under

@@ -14,11 +14,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.deflection import Deflection
 from tiengine.engine.stepper import Stepper
-from tiengine.envelopes import SeatEnvelopes, SlabEnvelopes
-from tiengine.gauge_samples import gauge_samples
 from tiengine.kernels import layout as at
+from tiengine.recording.deflection import Deflection
+from tiengine.recording.gauge_samples import gauge_samples
+from tiengine.recording.seat_envelopes import SeatEnvelopes
+from tiengine.recording.slab_envelopes import SlabEnvelopes
 from tiengine.result_files.channels import DEFLECTION, GAUGE_FORCE, GAUGE_MOTION, SEATS, SLABS
 from tiengine.result_files.layout import DTYPES, Block, GroupSpec
 from tiengine.scenario.gauges import Gauge, nearest_seat

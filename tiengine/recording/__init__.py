@@ -1,0 +1,1 @@
+"""Recording: what a run keeps of its state, and the guards that watch it."""
