@@ -32,8 +32,8 @@ LABELS = TrainLabels(["coach"], ["car"], np.zeros(4, np.int64), np.array([10.0, 
 
 @pytest.fixture
 def fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
-    """A ``tiengine.simulate`` that records its calls and writes ten samples, in an empty folder."""
-    module = ModuleType("tiengine.simulate")
+    """A ``tiengine.simulation.simulate`` that records its calls and writes ten samples, in an empty folder."""
+    module = ModuleType("tiengine.simulation.simulate")
     module.calls = []
     module.failure = None
 
@@ -56,7 +56,7 @@ def fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
             )
 
     module.run = run
-    monkeypatch.setitem(sys.modules, "tiengine.simulate", module)
+    monkeypatch.setitem(sys.modules, "tiengine.simulation.simulate", module)
     monkeypatch.setattr(tiengine, "simulate", module, raising=False)
     monkeypatch.chdir(tmp_path)
     return module

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tiengine.simulate import AUTO_STEPS
+from tiengine.simulation.simulate import AUTO_STEPS
 
 from .reference.marching import march, model_of
 

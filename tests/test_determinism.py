@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tiengine import simulate
 from tiengine.kernels import layout as at
 from tiengine.scenario.scenario import load_scenario
+from tiengine.simulation import simulate
 
 from .reference.marching import March, march, model_of
 

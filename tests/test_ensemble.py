@@ -18,14 +18,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tiengine import simulate
 from tiengine.cli import main
 from tiengine.parameters.errors import InputError, RunFailedError
-from tiengine.plan import plan
 from tiengine.result_files import reader as results
 from tiengine.result_files.checkpoint import checkpoint_paths
 from tiengine.result_files.reader import Result
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
+from tiengine.simulation import simulate
+from tiengine.simulation.tasks import plan
 
 SHORT = {
     "train.distance": 3.0,

@@ -14,9 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tiengine import cli_run, gather, simulate, worker
-from tiengine.disk_space import check_space, estimated_bytes
-from tiengine.gather import Gathering
+from tiengine import cli_run
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.result_files import journal
 from tiengine.result_files import reader as results
@@ -27,6 +25,10 @@ from tiengine.result_files.journal import atomic_write, journal_of
 from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import load_scenario
+from tiengine.simulation import collector as gather
+from tiengine.simulation import simulate, worker
+from tiengine.simulation.collector import Gathering
+from tiengine.simulation.disk_space import check_space, estimated_bytes
 from validation.faults.contents import contents, litter
 from validation.faults.page import page, rows
 from validation.faults.plan import RUNS, kills

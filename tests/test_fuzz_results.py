@@ -14,13 +14,13 @@ from click.testing import CliRunner
 from hypothesis import strategies as st
 
 import tiengine
-from tiengine import simulate
 from tiengine.cli import main
-from tiengine.gather import Gathering
 from tiengine.parameters.errors import RunStoppedError
-from tiengine.plan import Task
 from tiengine.result_files.reader import RUNNING
 from tiengine.result_files.writer import Writer
+from tiengine.simulation import simulate
+from tiengine.simulation.collector import Gathering
+from tiengine.simulation.tasks import Task
 
 from .fuzzing import DAMAGES, EXAMPLES, Damage, deadline, on_many, refused
 

@@ -18,12 +18,12 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from tiengine import simulate
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.parameters.input_files import parse_toml
 from tiengine.parameters.quantity import Params, build
 from tiengine.scenario.key_checks import NumberOr
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
+from tiengine.simulation import simulate
 
 from .fuzzing import BAD, EXAMPLES, mutated_texts, on_many, refused
 

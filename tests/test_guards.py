@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tiengine import simulate
 from tiengine.engine.state import State
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import SHIFT
@@ -15,6 +14,7 @@ from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recording.guards import Guard, climbing_shift
 from tiengine.scenario.event_policy import Events
 from tiengine.scenario.scenario import Scenario, load_scenario
+from tiengine.simulation import simulate
 
 from .reference.marching import model_of
 

@@ -7,7 +7,7 @@ import pytest
 
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulate import run
+from tiengine.simulation.simulate import run
 from tiengine.track.mortar import MortarVoid
 from tiengine.track.slab import load_slab
 from tiengine.track.slab_matrices import slab_matrices

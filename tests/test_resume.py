@@ -12,11 +12,11 @@ import h5py
 import numpy as np
 import pytest
 
-from tiengine import simulate
 from tiengine.parameters.errors import InputError, RunStoppedError
 from tiengine.result_files import reader as results
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths, sealed
 from tiengine.scenario.scenario import Scenario, load_scenario
+from tiengine.simulation import simulate
 
 SHORT = {
     "train.distance": 45.0,  # three chunks of 1000 steps at 300 km/h

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine import simulate
 from tiengine.engine.stability import TOLERATED_GROWTH, energy_growth
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import load_scenario
+from tiengine.simulation import simulate
 from tiengine.vehicle.train import static_wheel_loads
 
 from .reference.marching import KMH, march, model_of, scenario

@@ -9,11 +9,11 @@ import pytest
 import xarray
 from numpy.typing import NDArray
 
-from tiengine import simulate
 from tiengine.engine.state import State
 from tiengine.engine.static_track import StaticTrack
 from tiengine.kernels import layout as at
 from tiengine.scenario.scenario import load_scenario
+from tiengine.simulation import simulate
 
 from .reference.marching import KMH, March, march, model_of
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from tiengine.result_files.reader import Result as Result
     from tiengine.result_files.reader import open as open
     from tiengine.scenario.scenario import load_scenario as load_scenario
-    from tiengine.simulate import resume as resume
-    from tiengine.simulate import run as run
+    from tiengine.simulation.simulate import resume as resume
+    from tiengine.simulation.simulate import run as run
 
 __version__ = metadata.version("tiengine")
 __all__ = ["InputError", "Result", "load_scenario", "open", "resume", "run"]
@@ -26,8 +26,8 @@ _HOMES = {
     "Result": "tiengine.result_files.reader",
     "load_scenario": "tiengine.scenario.scenario",
     "open": "tiengine.result_files.reader",
-    "resume": "tiengine.simulate",
-    "run": "tiengine.simulate",
+    "resume": "tiengine.simulation.simulate",
+    "run": "tiengine.simulation.simulate",
 }
 
 

@@ -67,7 +67,7 @@ def run(
 
     check_output(path, force)
 
-    from tiengine import simulate
+    from tiengine.simulation import simulate
 
     _watched(
         lambda **screen: simulate.run(resolved, path, force=force, workers=workers, checkpoint=checkpoint, **screen),
@@ -84,7 +84,7 @@ def run(
 @_quiet
 def resume(file: Path, workers: int | None, checkpoint: float, quiet: bool) -> None:
     """Go on with a run that was stopped or killed: the result FILE gets the bits of a run without a break."""
-    from tiengine import simulate
+    from tiengine.simulation import simulate
 
     _watched(
         lambda **screen: simulate.resume(file, workers=workers, checkpoint=checkpoint, **screen),

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from tiengine.engine.stepper import Stepper
 from tiengine.irregularity.irregularity import Irregularity
-from tiengine.march import CHUNK_STEPS
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recording.guards import Guard
 from tiengine.recording.recorder import Recorder
 from tiengine.recording.trackside import Trackside
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario
+from tiengine.simulation.time_loop import CHUNK_STEPS
 
 __all__ = ["REST", "StageTimers", "TimedLoop", "Times", "shown"]
 

@@ -18,7 +18,7 @@ from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.state import State
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulate import prepare
+from tiengine.simulation.simulate import prepare
 from validation.case import Case
 from validation.runs import simulate
 from validation.semi_discrete import SemiDiscrete

@@ -30,7 +30,7 @@ from tiengine.contact.table import WheelRailPair
 from tiengine.model.from_scenario import ingredients
 from tiengine.parameters.errors import RunFailedError
 from tiengine.scenario.scenario import Scenario, load_scenario
-from tiengine.simulate import run
+from tiengine.simulation.simulate import run
 from tiengine.vehicle.train import TrainModel, static_wheel_loads
 from validation.case import Case
 from validation.closed_forms.linear_vehicle import EquivalentContact, equivalent_contact, fastest_growth

@@ -31,7 +31,7 @@ from scipy.optimize import least_squares
 from tiengine.contact.table import WheelRailPair
 from tiengine.model.from_scenario import ingredients
 from tiengine.scenario.scenario import Scenario, load_scenario
-from tiengine.simulate import run
+from tiengine.simulation.simulate import run
 from validation.case import Case
 from validation.closed_forms.klingel import free_wheelset, rigid_bogie, track_conicity
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tiengine.result_files.reader import Result
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulate import run
+from tiengine.simulation.simulate import run
 from validation.msm.simulate import FullLength, run_full_length
 
 __all__ = ["Forces", "full_length", "simulate"]

@@ -23,7 +23,7 @@ from scipy import signal
 from tiengine.engine import backend
 from tiengine.model.from_scenario import ingredients
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulate import run
+from tiengine.simulation.simulate import run
 from tiengine.vehicle.train import assemble, static_wheel_loads
 from validation.case import Case
 from validation.closed_forms.two_mass import (

@@ -18,7 +18,7 @@ from tiengine.engine.state import State
 from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.scenario.scenario import Scenario, load_scenario
-from tiengine.simulate import prepare as prepare_window
+from tiengine.simulation.simulate import prepare as prepare_window
 from validation.case import Case
 from validation.comparison import ALL_MODES, PER_METRE, difference
 from validation.msm.simulate import FullLength, load

@@ -86,8 +86,8 @@ class Yard:
 
     def _undisturbed(self) -> Contents:
         """In this process: kernels stay compiled."""
-        from tiengine import simulate
         from tiengine.scenario.scenario import load_scenario
+        from tiengine.simulation import simulate
 
         keep_shapes()
         words = self.run.arguments

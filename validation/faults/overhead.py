@@ -16,13 +16,13 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from tiengine.gather import COMMIT_SHARE, FLUSH_SECONDS, Gathering
-from tiengine.march import Run, _facts
-from tiengine.messages import Begun, Saved
-from tiengine.plan import plan
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import load_scenario, to_toml
-from tiengine.simulate import CHECKPOINT_SECONDS, _groups
+from tiengine.simulation.collector import COMMIT_SHARE, FLUSH_SECONDS, Gathering
+from tiengine.simulation.messages import Begun, Saved
+from tiengine.simulation.simulate import CHECKPOINT_SECONDS, _groups
+from tiengine.simulation.tasks import plan
+from tiengine.simulation.time_loop import Run, _facts
 
 __all__ = ["Overhead", "overhead"]
 

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from tiengine import march, simulate
 from tiengine.engine import time_step as prepare
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recording.guards import LIMITS
 from tiengine.scenario.scenario import load_scenario
+from tiengine.simulation import simulate
+from tiengine.simulation import time_loop as march
 from validation.faults.contents import Contents, contents
 from validation.faults.plan import SEED
 from validation.faults.space import Check

@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tiengine import simulate
-from tiengine.disk_space import estimated_bytes
 from tiengine.scenario.scenario import load_scenario
+from tiengine.simulation import simulate
+from tiengine.simulation.disk_space import estimated_bytes
 from validation.faults.kills import NAME, Yard
 from validation.faults.launch import Process
 

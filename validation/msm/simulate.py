@@ -19,7 +19,7 @@ from tiengine.recording.recorder import Recorder, Samples
 from tiengine.result_files.reader import Result
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
-from tiengine.simulate import Progress
+from tiengine.simulation.simulate import Progress
 from validation.msm.model import FullTrack, build_track
 from validation.msm.start import steady_rolling
 from validation.msm.step import Buffers, FullState, FullStepper

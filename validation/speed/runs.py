@@ -70,9 +70,9 @@ def perform(run: Run, distance: float) -> Facts:
     Returns:
         Attributes of the result, times in s, memory in MB, and ``file_mb``.
     """
-    from tiengine.memory import peak_memory  # here: the parent measures nothing and imports little
     from tiengine.scenario.scenario import load_scenario
-    from tiengine.simulate import run as simulate
+    from tiengine.simulation.peak_memory import peak_memory  # here: the parent measures nothing and imports little
+    from tiengine.simulation.simulate import run as simulate
     from validation.msm.simulate import FullLength, run_full_length
 
     scenario = load_scenario(run.scenario, settings_of(run, distance))

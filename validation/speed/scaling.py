@@ -104,7 +104,7 @@ def measure_outputs(rounds: int, distance: float) -> dict[str, Any]:
     """Time of a step of whole runs [us], over the interval of all outputs and over the channels of a wheel."""
     from tiengine.result_files.channels import WHEEL
     from tiengine.scenario.scenario import load_scenario
-    from tiengine.simulate import run as simulate
+    from tiengine.simulation.simulate import run as simulate
 
     dt, names = 2e-4, list(WHEEL)
     chosen: dict[tuple[str, int], dict[str, Any]] = {}

@@ -22,17 +22,17 @@ from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.engine.time_step import prepare
 from tiengine.irregularity.irregularity import Irregularity, check_reach, make_irregularity
 from tiengine.kernels import layout as at
-from tiengine.memory import peak_memory
-from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
 from tiengine.model.model import Model
 from tiengine.parameters.errors import InputError
-from tiengine.plan import Task
 from tiengine.recording.guards import Guard
 from tiengine.recording.recorder import Recorder
 from tiengine.recording.trackside import Trackside
 from tiengine.result_files.checkpoint import Checkpoint
 from tiengine.result_files.layout import Block, TrainLabels
 from tiengine.scenario.scenario import Scenario
+from tiengine.simulation.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
+from tiengine.simulation.peak_memory import peak_memory
+from tiengine.simulation.tasks import Task
 
 __all__ = ["CHUNK_STEPS", "Run", "march", "never"]
 

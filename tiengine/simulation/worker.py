@@ -26,9 +26,9 @@ from typing import TYPE_CHECKING, cast
 from threadpoolctl import threadpool_limits
 
 if TYPE_CHECKING:
-    from tiengine.messages import Message
-    from tiengine.plan import Task
     from tiengine.result_files.checkpoint import Checkpoint
+    from tiengine.simulation.messages import Message
+    from tiengine.simulation.tasks import Task
 
 __all__ = ["distribute"]
 
@@ -61,7 +61,7 @@ def work(pipe: Connection, public: bool, every: float) -> None:
         signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_leave_with_parent, daemon=True).start()
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
-    from tiengine.march import march
+    from tiengine.simulation.time_loop import march
 
     try:
         with threadpool_limits(1):
@@ -120,7 +120,7 @@ def distribute(
     Raises:
         RunFailedError: A worker died before it could take a task.
     """
-    from tiengine.messages import Lost
+    from tiengine.simulation.messages import Lost
 
     waiting = deque(tasks)
     deaths: Counter[int] = Counter()

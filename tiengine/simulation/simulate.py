@@ -12,13 +12,8 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from tiengine.disk_space import check_space
 from tiengine.engine.time_step import AUTO_STEPS, prepare
-from tiengine.gather import Gathering, Progress, Tell
-from tiengine.march import march, never
-from tiengine.messages import Message
 from tiengine.parameters.errors import InputError, RunFailedError, RunStoppedError
-from tiengine.plan import Task, plan
 from tiengine.recording.recorder import Recorder
 from tiengine.recording.trackside import trackside_groups
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
@@ -29,7 +24,12 @@ from tiengine.result_files.reader import open as open_result
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.simulation import IMPORT_BEGAN
-from tiengine.worker import distribute
+from tiengine.simulation.collector import Gathering, Progress, Tell
+from tiengine.simulation.disk_space import check_space
+from tiengine.simulation.messages import Message
+from tiengine.simulation.tasks import Task, plan
+from tiengine.simulation.time_loop import march, never
+from tiengine.simulation.worker import distribute
 
 IMPORT_SECONDS = time.perf_counter() - IMPORT_BEGAN
 

@@ -10,14 +10,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tiengine.memory import peak_memory
-from tiengine.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path
 from tiengine.result_files.events import Event
 from tiengine.result_files.reader import COMPLETE, RUNNING, Result
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, duration
+from tiengine.simulation.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
+from tiengine.simulation.peak_memory import peak_memory
 
 __all__ = ["Gathering", "Progress", "Tell"]
 
