@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine.comfort import mean_comfort, total_rms
-from tiengine.filters import block_rms, weighted
+from tiengine.indices.comfort import mean_comfort, total_rms
+from tiengine.indices.filters import block_rms, weighted
 
 
 def test_mean_comfort_takes_the_95th_percentile():

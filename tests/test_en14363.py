@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine.en14363 import extreme, section_length, shortfall, wheel_force_limit
+from tiengine.indices.en14363 import extreme, section_length, shortfall, wheel_force_limit
 
 KMH = 1.0 / 3.6
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tiengine.figures import envelopes, gauges, waterfall
-from tiengine.figures.extremes import read_extremes
-from tiengine.figures.source import AbsentError, Train
+from tiengine.indices.extremes import read_extremes
+from tiengine.indices.train_record import AbsentError, Train
 from tiengine.result_files.reader import Result
 
 from . import hand_made as by

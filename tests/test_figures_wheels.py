@@ -8,8 +8,8 @@ from scipy import signal
 
 from tiengine.figures import compare, contact, ensemble, forces, ride, spectrum
 from tiengine.figures.curve import BINS, Band, Curve
-from tiengine.figures.source import SLICE, AbsentError, Train
-from tiengine.filters import low_pass, sliding_mean
+from tiengine.indices.filters import low_pass, sliding_mean
+from tiengine.indices.train_record import SLICE, AbsentError, Train
 from tiengine.parameters.errors import InputError
 
 from . import hand_made as by

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine.filters import WEIGHTINGS, band_pass, block_rms, low_pass, sliding_mean, weighted
+from tiengine.indices.filters import WEIGHTINGS, band_pass, block_rms, low_pass, sliding_mean, weighted
 
 THIRDS = np.array(
     [0.1, 0.125, 0.16, 0.2, 0.25, 0.315, 0.4, 0.5, 0.63, 0.8, 1, 1.25, 1.6, 2, 2.5, 3.15, 4, 5, 6.3, 8, 10, 12.5, 16,

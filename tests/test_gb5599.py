@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine.gb5599 import sperling, sperling_weight, unloading
+from tiengine.indices.gb5599 import sperling, sperling_weight, unloading
 
 TIME = np.arange(0.0, 5.0, 1e-3)
 

@@ -11,14 +11,14 @@ import pytest
 from click.testing import CliRunner
 
 from tiengine.cli import main
-from tiengine.metrics import evaluate
+from tiengine.indices.metrics import evaluate
+from tiengine.indices.ride import Ride
 from tiengine.metrics_table import metrics_table
 from tiengine.parameters.errors import InputError
 from tiengine.profile_tables import show
 from tiengine.result_files import reader as results
 from tiengine.result_files.channels import WHEEL
 from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
-from tiengine.ride import Ride
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.vehicle.train import assemble, static_wheel_loads
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tiengine.contact.table_cache import contact_table
-from tiengine.p2 import contact_stiffness, p2_frequency, p2_of
+from tiengine.indices.p2_resonance import contact_stiffness, p2_frequency, p2_of
 from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import load_scenario
 from tiengine.vehicle.train import assemble, static_wheel_loads

@@ -15,8 +15,8 @@ from click.testing import CliRunner, Result
 
 from tiengine.cli import main
 from tiengine.figures.catalogue import KINDS
-from tiengine.figures.source import Train
-from tiengine.key_figures import KeyFigure, key_figures, summarise
+from tiengine.indices.key_figures import KeyFigure, key_figures, summarise
+from tiengine.indices.train_record import Train
 from tiengine.report import render
 from tiengine.result_files import reader as results
 from tiengine.scenario.scenario import load_scenario

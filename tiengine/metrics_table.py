@@ -8,8 +8,8 @@ from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
-from tiengine.index import Index
-from tiengine.metrics import Metrics
+from tiengine.indices.index import Index
+from tiengine.indices.metrics import Metrics
 
 __all__ = ["metrics_table", "notes"]
 

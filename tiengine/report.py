@@ -15,11 +15,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 import tiengine
 from tiengine.figures.catalogue import KINDS
-from tiengine.figures.source import AbsentError, Train
 from tiengine.figures.style import png
-from tiengine.index import Index
-from tiengine.key_figures import key_figures, summarise
-from tiengine.metrics import Metrics
+from tiengine.indices.index import Index
+from tiengine.indices.key_figures import key_figures, summarise
+from tiengine.indices.metrics import Metrics
+from tiengine.indices.train_record import AbsentError, Train
 from tiengine.metrics_table import notes
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.output_file import check_output

@@ -40,7 +40,7 @@ class Kind:
             arguments: Number of the train; before it, for ``compare``, the second file.
 
         Raises:
-            InputError: The file cannot give it; an :class:`tiengine.figures.source.AbsentError` if it lacks a group.
+            InputError: The file cannot give it; an :class:`tiengine.indices.train_record.AbsentError` if it lacks a group.
         """
         figure: Figure = import_module(f"tiengine.figures.{self.name}").draw(result, *arguments)
         return figure

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tiengine.figures.curve import Band, Curve, bins_for
 from tiengine.figures.palette import BLACK, GREY
-from tiengine.figures.source import Samples, Train
 from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure
+from tiengine.indices.train_record import Samples, Train
 from tiengine.parameters.errors import InputError
 
 if TYPE_CHECKING:

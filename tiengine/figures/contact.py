@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.figures.palette import BLACK
-from tiengine.figures.source import AbsentError, Train
 from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure, plain
+from tiengine.indices.train_record import AbsentError, Train
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

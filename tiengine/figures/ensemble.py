@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tiengine.figures.curve import Band
 from tiengine.figures.palette import BLUE, GREY, SKY, VERMILION
-from tiengine.figures.source import AbsentError, Samples, Train
 from tiengine.figures.style import in_style, new_figure
+from tiengine.indices.train_record import AbsentError, Samples, Train
 from tiengine.result_files.reader import COMPLETE
 
 if TYPE_CHECKING:

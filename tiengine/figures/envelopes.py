@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tiengine.figures.curve import Curve
-from tiengine.figures.extremes import Extremes, read_extremes
 from tiengine.figures.neighbours import draw_seats, draw_slabs
 from tiengine.figures.palette import BLACK, ORANGE, PURPLE
-from tiengine.figures.source import AbsentError, Train
 from tiengine.figures.style import LEFT, RIGHT, Look, in_style, new_figure
+from tiengine.indices.extremes import Extremes, read_extremes
+from tiengine.indices.train_record import AbsentError, Train
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

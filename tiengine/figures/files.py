@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiengine.figures.catalogue import COMPARE, KINDS, kind_named
-from tiengine.figures.source import AbsentError
 from tiengine.figures.style import check_suffix, save
+from tiengine.indices.train_record import AbsentError
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.output_file import check_output
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine import en14363, gb5599
 from tiengine.figures.curve import Band, Curve, bins_for
 from tiengine.figures.palette import GREY
-from tiengine.figures.source import AbsentError, Samples, Train
 from tiengine.figures.style import LEFT, RIGHT, Look, in_style, limit_line, new_figure
-from tiengine.filters import sliding_mean
-from tiengine.ride import FORCE_CUT_OFF, LEAST_RATE, UNLOADED
+from tiengine.indices import en14363, gb5599
+from tiengine.indices.filters import sliding_mean
+from tiengine.indices.ride import FORCE_CUT_OFF, LEAST_RATE, UNLOADED
+from tiengine.indices.train_record import AbsentError, Samples, Train
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

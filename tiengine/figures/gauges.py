@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tiengine.figures.curve import Curve
 from tiengine.figures.palette import BLUE, VERMILION
-from tiengine.figures.source import AbsentError, Train
 from tiengine.figures.style import Look, in_style, new_figure, plain
+from tiengine.indices.train_record import AbsentError, Train
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

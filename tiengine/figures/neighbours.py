@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.figures.extremes import Extremes
 from tiengine.figures.palette import BLACK, ORANGE, PURPLE
 from tiengine.figures.style import LEFT, RIGHT
+from tiengine.indices.extremes import Extremes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

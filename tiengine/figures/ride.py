@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tiengine.en14363 import ACCELERATION_LIMIT, BAND
 from tiengine.figures.curve import Curve
-from tiengine.figures.source import AbsentError, Train
 from tiengine.figures.style import LEFT, RIGHT, in_style, limit_line, new_figure
-from tiengine.filters import band_pass
+from tiengine.indices.en14363 import ACCELERATION_LIMIT, BAND
+from tiengine.indices.filters import band_pass
+from tiengine.indices.ride import Ride
+from tiengine.indices.train_record import AbsentError, Train
 from tiengine.parameters.errors import InputError
-from tiengine.ride import Ride
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,7 +24,7 @@ __all__ = ["draw"]
 def draw(result: Result, train: int = 0) -> Figure:
     """Lateral and vertical acceleration over either bogie, left of the centre line, 0.4 to 10 Hz, behind the run-in.
 
-    The points are those of the indices (:mod:`tiengine.ride`). Holds one value a sample of the bodies in memory, as
+    The points are those of the indices (:mod:`tiengine.indices.ride`). Holds one value a sample of the bodies in memory, as
     the indices do.
 
     Args:

@@ -1,7 +1,7 @@
 """Power spectral densities of wheel forces and accelerations, with the frequencies that a track imposes.
 
 What is passed every d excites at V/d: seats, slabs, and seen from the rail, wheelsets of a bogie, bogies, vehicles.
-P2: :mod:`tiengine.p2`.
+P2: :mod:`tiengine.indices.p2_resonance`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from tiengine.figures.palette import BLACK, BLUE, GREEN, ORANGE
-from tiengine.figures.source import SLICE, AbsentError, Samples, Train
 from tiengine.figures.style import LEFT, RIGHT, Look, in_style, new_figure, plain
-from tiengine.p2 import p2_of
+from tiengine.indices.p2_resonance import p2_of
+from tiengine.indices.train_record import SLICE, AbsentError, Samples, Train
 from tiengine.scenario.contact_settings import contact_settings
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
 from tiengine.figures.palette import BLACK, SKY
-from tiengine.figures.source import AbsentError, Train
 from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure
+from tiengine.indices.train_record import AbsentError, Train
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

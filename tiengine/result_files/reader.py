@@ -24,7 +24,7 @@ from tiengine.result_files.journal import journal_of
 if TYPE_CHECKING:
     import xarray
 
-    from tiengine.metrics import Metrics
+    from tiengine.indices.metrics import Metrics
     from tiengine.scenario.scenario import Scenario
 
 __all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "RUNNING", "Result", "open"]
@@ -279,7 +279,7 @@ class Result:
         Raises:
             InputError: No such train, or the file lacks what the indices need.
         """
-        from tiengine.metrics import evaluate  # filters and vehicles: not for those who only read
+        from tiengine.indices.metrics import evaluate  # filters and vehicles: not for those who only read
 
         return evaluate(self, train)
 

@@ -17,9 +17,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.filters import block_rms, weighted
-from tiengine.index import Index, worst
-from tiengine.ride import FloorPoint, Ride
+from tiengine.indices.filters import block_rms, weighted
+from tiengine.indices.index import Index, worst
+from tiengine.indices.ride import FloorPoint, Ride
 
 __all__ = ["en12299_indices", "iso2631_indices", "mean_comfort", "total_rms"]
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from tiengine import comfort, en14363, gb5599
-from tiengine.index import Index
+from tiengine.indices import comfort, en14363, gb5599
+from tiengine.indices.index import Index
+from tiengine.indices.ride import Ride
 from tiengine.parameters.errors import InputError
-from tiengine.ride import Ride
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Result

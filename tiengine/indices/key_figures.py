@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.figures.extremes import Extremes, read_extremes
-from tiengine.figures.source import AbsentError, Samples, Train
+from tiengine.indices.extremes import Extremes, read_extremes
+from tiengine.indices.train_record import AbsentError, Samples, Train
 
 __all__ = ["KeyFigure", "Summary", "key_figures", "summarise"]
 

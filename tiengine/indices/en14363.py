@@ -17,9 +17,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.filters import band_pass, sliding_mean
-from tiengine.index import Index, worst
-from tiengine.ride import Ride
+from tiengine.indices.filters import band_pass, sliding_mean
+from tiengine.indices.index import Index, worst
+from tiengine.indices.ride import Ride
 
 __all__ = [
     "QUOTIENT_LIMIT",

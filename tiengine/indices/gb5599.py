@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from tiengine.filters import band_pass, sliding_mean
-from tiengine.index import Index, worst
-from tiengine.ride import FloorPoint, Forces, Ride
+from tiengine.indices.filters import band_pass, sliding_mean
+from tiengine.indices.index import Index, worst
+from tiengine.indices.ride import FloorPoint, Forces, Ride
 
 __all__ = [
     "axle_force_limit",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.figures.source import AbsentError, Train
+from tiengine.indices.train_record import AbsentError, Train
 
 __all__ = ["Extremes", "read_extremes"]
 

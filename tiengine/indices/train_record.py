@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.filters import low_pass
+from tiengine.indices.filters import low_pass
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import parse_toml
 from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads

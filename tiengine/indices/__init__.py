@@ -1,0 +1,1 @@
+"""Indices of the standards and key figures of a result."""
