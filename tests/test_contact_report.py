@@ -14,7 +14,7 @@ from tiengine.cli import main
 from tiengine.contact.conicity import equivalent_conicity, rolling_radius_difference
 from tiengine.contact.profile import load_profile
 from tiengine.contact.table import ContactSettings, WheelRailPair
-from tiengine.contact_report import contact_report, draw
+from tiengine.report.contact_report import contact_report, draw
 
 PRINTED = 0.0350
 """LMA on CHN60 at 3 mm, another program's digits (tests/test_conicity.py)."""

@@ -121,8 +121,8 @@ def contact(
     """Show how WHEEL and RAIL, presets or files, touch: rolling radii, conicity, points of contact."""
     from tiengine.contact.profile import ROUNDING_LENGTH, load_profile
     from tiengine.contact.table import ContactSettings
-    from tiengine.contact_report import contact_report, draw
     from tiengine.parameters.quantity import build
+    from tiengine.report.contact_report import contact_report, draw
     from tiengine.result_files.output_file import check_output
 
     length = ROUNDING_LENGTH if smoothing is None else smoothing

@@ -48,7 +48,8 @@ def info(file: Path) -> None:
 @click.option("--json", "output", type=click.Path(path_type=Path), help="Write all indices here too, replacing a file.")
 def metrics(file: Path, train: int | None, output: Path | None) -> None:
     """Indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 for a result FILE, beside their limits."""
-    from tiengine import metrics_table, profile_tables
+    from tiengine import profile_tables
+    from tiengine.report import metrics_table
     from tiengine.result_files import reader as results
     from tiengine.result_files.output_file import check_output
 
@@ -106,7 +107,7 @@ def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, 
 @click.option("--train", type=click.IntRange(0), help="Whose figures; default: the first that ran to its end.")
 def report(file: Path, output: Path | None, train: int | None) -> None:
     """Make one HTML page of a result FILE: scenario, key figures, indices and figures; it needs no network."""
-    from tiengine import report as reporting
+    from tiengine.report import page as reporting
     from tiengine.result_files import reader as results
 
     path = output or file.with_suffix(".html")

@@ -20,12 +20,12 @@ from tiengine.indices.index import Index
 from tiengine.indices.key_figures import key_figures, summarise
 from tiengine.indices.metrics import Metrics
 from tiengine.indices.train_record import AbsentError, Train
-from tiengine.metrics_table import notes
 from tiengine.parameters.errors import InputError
+from tiengine.report.metrics_table import notes
+from tiengine.report.scenario_words import scenario_words
 from tiengine.result_files.output_file import check_output
 from tiengine.result_files.reader import COMPLETE
 from tiengine.result_files.summary import summary
-from tiengine.scenario_words import scenario_words
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Result

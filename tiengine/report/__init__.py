@@ -1,0 +1,1 @@
+"""Reports: pages and tables about a result or a contact geometry."""
