@@ -14,7 +14,7 @@ from tiengine.cli import main
 from tiengine.indices.metrics import evaluate
 from tiengine.indices.ride import Ride
 from tiengine.parameters.errors import InputError
-from tiengine.profile_tables import show
+from tiengine.profiling.tables import show
 from tiengine.report.metrics_table import metrics_table
 from tiengine.result_files import reader as results
 from tiengine.result_files.channels import WHEEL

@@ -11,18 +11,20 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tiengine import products, profiling, timed_loop
 from tiengine.cli import main
 from tiengine.kernels import layout as at
-from tiengine.machine import cache_bytes
 from tiengine.parameters.errors import InputError, RunFailedError
-from tiengine.products import count_products
-from tiengine.profile_report import ProfileReport, compare, read_json
+from tiengine.profiling import product_count as products
+from tiengine.profiling import profile as profiling
+from tiengine.profiling import timed_loop
+from tiengine.profiling.machine import cache_bytes
+from tiengine.profiling.product_count import count_products
+from tiengine.profiling.report import ProfileReport, compare, read_json
+from tiengine.profiling.roofline import Roofs
+from tiengine.profiling.timed_loop import StageTimers, Times
 from tiengine.recording.guards import Guard
 from tiengine.result_files.events import Event
-from tiengine.roofs import Roofs
 from tiengine.scenario.scenario import load_scenario
-from tiengine.timed_loop import StageTimers, Times
 
 from .models import V350, Run, paper_model
 

@@ -61,7 +61,8 @@ def profile(
     compare: tuple[Path, Path] | None,
 ) -> None:
     """Measure where the time of SCENARIO's loop goes, stage by stage, in this process."""
-    from tiengine import profile_report, profile_tables
+    from tiengine.profiling import report as profile_report
+    from tiengine.profiling import tables as profile_tables
 
     if compare:
         reports = [profile_report.read_json(path) for path in compare]
@@ -77,8 +78,8 @@ def profile(
 
         check_output(file, force=True)
 
-    from tiengine import profiling
     from tiengine.parameters.errors import RunFailedError
+    from tiengine.profiling import profile as profiling
 
     try:
         with _ended_by_sigterm():

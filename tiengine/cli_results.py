@@ -48,7 +48,7 @@ def info(file: Path) -> None:
 @click.option("--json", "output", type=click.Path(path_type=Path), help="Write all indices here too, replacing a file.")
 def metrics(file: Path, train: int | None, output: Path | None) -> None:
     """Indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 for a result FILE, beside their limits."""
-    from tiengine import profile_tables
+    from tiengine.profiling import tables as profile_tables
     from tiengine.report import metrics_table
     from tiengine.result_files import reader as results
     from tiengine.result_files.output_file import check_output

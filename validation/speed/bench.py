@@ -14,9 +14,9 @@ from tiengine.engine.state import State
 from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.model.model import Ingredients, build_model
+from tiengine.profiling.timed_loop import StageTimers, Times
 from tiengine.recording.recorder import Recorder
 from tiengine.scenario.scenario import Scenario
-from tiengine.timed_loop import StageTimers, Times
 
 __all__ = ["Bench", "timed_in_turn"]
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import psutil
 
-from tiengine.machine import this_machine, versions
+from tiengine.profiling.machine import this_machine, versions
 from validation.speed.runs import CASES
 
 __all__ = ["Circumstances", "Findings", "Row", "circumstances", "read", "rows", "write"]

@@ -45,7 +45,7 @@ def profiled(trains: int, steps: int) -> dict[str, Any]:
         trains: Advanced together.
         steps: How many to measure.
     """
-    from tiengine.profiling import profile  # here: the parent starts no Taichi
+    from tiengine.profiling.profile import profile  # here: the parent starts no Taichi
     from tiengine.scenario.scenario import load_scenario
 
     return asdict(profile(load_scenario("paper", settings_of(RUNS["paper"], WAY)), trains=trains, steps=steps))

@@ -18,19 +18,19 @@ from taichi.lang import impl
 from threadpoolctl import threadpool_limits
 
 from tiengine.kernels import layout as at
-from tiengine.machine import import_seconds, this_machine, versions
 from tiengine.parameters.errors import InputError
-from tiengine.products import Work, count_products
-from tiengine.profile_report import Loop, Memory, ProfileReport, Rate, Stage, Wall
+from tiengine.profiling.machine import import_seconds, this_machine, versions
+from tiengine.profiling.product_count import Work, count_products
+from tiengine.profiling.report import Loop, Memory, ProfileReport, Rate, Stage, Wall
+from tiengine.profiling.roofline import Roofs, measure_roofs
+from tiengine.profiling.stage_estimates import contact_us, suspension_us
+from tiengine.profiling.timed_loop import REST, StageTimers, TimedLoop, Times, shown
 from tiengine.recording.trackside import trackside_groups
 from tiengine.result_files.writer import Writer
-from tiengine.roofs import Roofs, measure_roofs
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.simulation.peak_memory import peak_memory
 from tiengine.simulation.tasks import Task, plan
 from tiengine.simulation.time_loop import CHUNK_STEPS, Run
-from tiengine.stage_split import contact_us, suspension_us
-from tiengine.timed_loop import REST, StageTimers, TimedLoop, Times, shown
 
 __all__ = ["array_bytes", "profile"]
 

@@ -8,7 +8,7 @@ from rich.console import Console, Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
-from tiengine.profile_report import Comparison, ProfileReport, Rate
+from tiengine.profiling.report import Comparison, ProfileReport, Rate
 
 __all__ = ["comparison_table", "report_tables", "show"]
 

@@ -9,10 +9,10 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from tiengine.machine import Machine
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import LARGEST_TOML, read_bytes
-from tiengine.roofs import Roofs
+from tiengine.profiling.machine import Machine
+from tiengine.profiling.roofline import Roofs
 
 __all__ = ["Comparison", "Loop", "Memory", "ProfileReport", "Rate", "Stage", "Wall", "compare", "read_json"]
 
