@@ -19,7 +19,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import tiengine
-from tiengine.cli import main
+from tiengine.cli.commands import main
 from tiengine.parameters.errors import RunStoppedError
 from tiengine.parameters.presets import KINDS, preset_names
 from tiengine.result_files import reader as results

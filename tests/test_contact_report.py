@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from tiengine.cli import main
+from tiengine.cli.commands import main
 from tiengine.contact.conicity import equivalent_conicity, rolling_radius_difference
 from tiengine.contact.profile import load_profile
 from tiengine.contact.table import ContactSettings, WheelRailPair

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tiengine.cli import main
+from tiengine.cli.commands import main
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.result_files import reader as results
 from tiengine.result_files.checkpoint import checkpoint_paths

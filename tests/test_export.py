@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from pyarrow import parquet
 from scipy.io import loadmat
 
-from tiengine.cli import main
+from tiengine.cli.commands import main
 from tiengine.parameters.errors import InputError
 from tiengine.result_files import export as module
 from tiengine.result_files import reader as results

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tiengine import cli_run
+from tiengine.cli import simulating as cli_run
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.result_files import journal
 from tiengine.result_files import reader as results

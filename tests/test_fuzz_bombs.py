@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import tiengine
-from tiengine.cli import main
+from tiengine.cli.commands import main
 from tiengine.contact.profile import load_profile
 from tiengine.contact.profile_files import MOST_POINTS
 from tiengine.irregularity.measured_files import read_series

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from hypothesis import strategies as st
 
 import tiengine
-from tiengine.cli import main
+from tiengine.cli.commands import main
 from tiengine.parameters.errors import RunStoppedError
 from tiengine.result_files.reader import RUNNING
 from tiengine.result_files.writer import Writer

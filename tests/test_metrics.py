@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tiengine.cli import main
+from tiengine.cli.commands import main
+from tiengine.cli.screen import show
 from tiengine.indices.metrics import evaluate
 from tiengine.indices.ride import Ride
 from tiengine.parameters.errors import InputError
-from tiengine.profiling.tables import show
 from tiengine.report.metrics_table import metrics_table
 from tiengine.result_files import reader as results
 from tiengine.result_files.channels import WHEEL

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tiengine.cli import main
+from tiengine.cli.commands import main
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.profiling import product_count as products

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from tiengine.cli import main
+from tiengine.cli.commands import main
 from tiengine.figures.catalogue import KINDS
 from tiengine.indices.key_figures import KeyFigure, key_figures, summarise
 from tiengine.indices.train_record import Train

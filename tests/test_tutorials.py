@@ -8,7 +8,7 @@ import pytest
 from click import Command
 from click.testing import CliRunner
 
-from tiengine.cli import main
+from tiengine.cli.commands import main
 from validation.__main__ import main as validation
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -4,23 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
 from tiengine.profiling.report import Comparison, ProfileReport, Rate
 
-__all__ = ["comparison_table", "report_tables", "show"]
-
-PIPE_WIDTH = 120  # columns where there is no terminal
-
-
-def show(content: RenderableType) -> None:
-    """Print to stdout, as wide as the terminal."""
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console = Console(highlight=False, width=PIPE_WIDTH)
-    console.print(content)
+__all__ = ["comparison_table", "report_tables"]
 
 
 def report_tables(report: ProfileReport) -> RenderableType:

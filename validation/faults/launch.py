@@ -151,7 +151,7 @@ def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str]) -> in
 
     import click
 
-    from tiengine.cli import main
+    from tiengine.cli.commands import main
     from tiengine.simulation import worker
     from validation.faults.record import recorded
 

@@ -79,7 +79,7 @@ def read(log: Path) -> Record:
 
 
 if __name__ == "__main__":
-    from tiengine.cli import main
+    from tiengine.cli.commands import main
 
     recorded(Path(sys.argv[1]))
     main(sys.argv[2:], prog_name="tiengine")

@@ -1,6 +1,6 @@
 """Commands that read results: ``tiengine info``, ``metrics``, ``plot``, ``report``; none of them needs Taichi to begin.
 
-:data:`COMMANDS` joins the group of :mod:`tiengine.cli`.
+:data:`COMMANDS` joins the group of :mod:`tiengine.cli.commands`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import Any
 
 import click
 
+from tiengine.cli.screen import print_rows
 from tiengine.figures.catalogue import COMPARE, names
 from tiengine.parameters.input_files import parse_toml
 from tiengine.result_files.summary import SUMMARY, summary
-from tiengine.screen import print_rows
 
 __all__ = ["COMMANDS"]
 

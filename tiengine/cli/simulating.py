@@ -19,8 +19,8 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from tiengine.cli.screen import print_rows
 from tiengine.result_files.summary import summary
-from tiengine.screen import print_rows
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Result

@@ -6,11 +6,11 @@ import sys
 from collections.abc import Sequence
 
 import click
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
-__all__ = ["print_rows"]
+__all__ = ["PIPE_WIDTH", "print_rows", "show"]
 
 
 def print_rows(rows: Sequence[tuple[str, str]]) -> None:
@@ -26,3 +26,14 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
     for row in rows:
         table.add_row(*map(escape, row))
     Console(highlight=False).print(table)
+
+
+PIPE_WIDTH = 120  # columns where there is no terminal
+
+
+def show(content: RenderableType) -> None:
+    """Print to stdout, as wide as the terminal."""
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console = Console(highlight=False, width=PIPE_WIDTH)
+    console.print(content)

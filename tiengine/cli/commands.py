@@ -16,10 +16,11 @@ from typing import Any
 
 import click
 
-from tiengine import cli_results, cli_run
+from tiengine.cli import reading as cli_results
+from tiengine.cli import simulating as cli_run
+from tiengine.cli.screen import print_rows
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.presets import KINDS, preset_names, preset_source
-from tiengine.screen import print_rows
 
 __all__ = ["main"]
 
