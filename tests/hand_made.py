@@ -9,9 +9,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tiengine.result_files import reader as results
+from tiengine import result as results
+from tiengine.result import Result
 from tiengine.result_files.damage import LAYOUT
-from tiengine.result_files.reader import FORMAT, FORMAT_VERSION, Result
+from tiengine.result_files.reader import FORMAT, FORMAT_VERSION
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.vehicle.train import assemble, static_wheel_loads
 

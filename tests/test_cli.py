@@ -19,10 +19,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 import tiengine
+from tiengine import result as results
 from tiengine.cli.commands import main
 from tiengine.parameters.errors import RunStoppedError
 from tiengine.parameters.presets import KINDS, preset_names
-from tiengine.result_files import reader as results
 from tiengine.result_files.channels import WHEEL
 from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
 from tiengine.scenario.scenario import to_toml

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from validation.closed_forms.floquet import (
     Seats,
     deflection_under_load,
@@ -18,7 +18,6 @@ from validation.closed_forms.receptance import receptance
 from validation.closed_forms.timoshenko import Beam, moving_load_deflection
 from validation.closed_forms.winkler import critical_speed, damped_deflection, undamped_deflection
 
-Reals = NDArray[np.float64]
 CHN60 = Beam(EI=2.059e11 * 3.217e-5, kGA=0.5329 * 7.9e10 * 7.745e-3, m=60.64, rho_I=7830.0 * 3.217e-5)
 SEATS = Seats(pitch=0.65, stiffness=4e7, damping=5e4)
 P, V350 = 70e3, 350.0 / 3.6

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tiengine import result as results
 from tiengine.parameters.errors import InputError
-from tiengine.result_files import reader as results
 from tiengine.result_files.channels import SEATS, WHEEL
 from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
 from tiengine.result_files.writer import Writer

@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from tiengine import result as results
 from tiengine.cli.commands import main
 from tiengine.parameters.errors import InputError, RunFailedError
-from tiengine.result_files import reader as results
+from tiengine.result import Result
 from tiengine.result_files.checkpoint import checkpoint_paths
-from tiengine.result_files.reader import Result
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.simulation import simulate
 from tiengine.simulation.tasks import plan

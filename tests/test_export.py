@@ -13,10 +13,10 @@ from click.testing import CliRunner
 from pyarrow import parquet
 from scipy.io import loadmat
 
+from tiengine import result as results
 from tiengine.cli.commands import main
 from tiengine.parameters.errors import InputError
 from tiengine.result_files import export as module
-from tiengine.result_files import reader as results
 from tiengine.result_files.channels import BODY, GAUGE_MOTION, IRREGULARITY, SEATS, WHEEL, Channel
 from tiengine.result_files.export import export
 from tiengine.result_files.layout import Block, GroupSpec, TrainLabels

@@ -14,10 +14,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tiengine import result as results
 from tiengine.cli import simulating as cli_run
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.result_files import journal
-from tiengine.result_files import reader as results
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
 from tiengine.result_files.events import Event
 from tiengine.result_files.file_lock import locked, release
@@ -243,7 +243,7 @@ def test_a_full_disk_is_one_sentence_and_keeps_what_was_committed(tmp_path, monk
             writer.describe(0, {"simulated_time": 1.0})
         writer.commit()
 
-    with pytest.raises(InputError, match=r"run\.h5': cannot be written .*No space left"), begun(path) as writer:
+    with pytest.raises(InputError, match=r"run\.h5': cannot be written .*No space left"), begun(path) as writer:  # noqa: PT012
         write(writer, 0)
         writer.commit()
         go_on(writer)

@@ -11,7 +11,7 @@ import pytest
 from tiengine.figures import envelopes, gauges, waterfall
 from tiengine.indices.extremes import read_extremes
 from tiengine.indices.train_record import AbsentError, Train
-from tiengine.result_files.reader import Result
+from tiengine.result import Result
 
 from . import hand_made as by
 

@@ -89,7 +89,7 @@ def test_limits_of_the_forces(tmp_path):
     Q0 = 1e-3 * by.static_loads(of)[0].mean()
     with by.made(tmp_path / "a.h5", of, {"wheel": by.wheel(*noise(300))}) as result:
         figure = forces.draw(result)
-    near = lambda *values: {round(float(value), 6) for value in values}
+    near = lambda *values: {round(float(value), 6) for value in values}  # noqa: E731
     assert near(min(90.0 + Q0, 160.0), Q0, 0.2 * Q0) <= heights(figure.axes[0])
     axle = 2.0 * Q0 / 3.0
     assert near(10.0 + axle, -10.0 - axle, 15.0 + axle, -15.0 - axle) == heights(figure.axes[2])

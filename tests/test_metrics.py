@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from tiengine import result as results
 from tiengine.cli.commands import main
 from tiengine.cli.screen import show
 from tiengine.indices.metrics import evaluate
 from tiengine.indices.ride import Ride
 from tiengine.parameters.errors import InputError
 from tiengine.report.metrics_table import metrics_table
-from tiengine.result_files import reader as results
 from tiengine.result_files.channels import WHEEL
 from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from tiengine import result as results
 from tiengine.cli.commands import main
 from tiengine.figures.catalogue import KINDS
 from tiengine.indices.key_figures import KeyFigure, key_figures, summarise
 from tiengine.indices.train_record import Train
 from tiengine.report.page import render
 from tiengine.report.scenario_words import scenario_words
-from tiengine.result_files import reader as results
 from tiengine.scenario.scenario import load_scenario
 
 from . import hand_made as by

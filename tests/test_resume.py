@@ -12,8 +12,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tiengine import result as results
 from tiengine.parameters.errors import InputError, RunStoppedError
-from tiengine.result_files import reader as results
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths, sealed
 from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.simulation import simulate

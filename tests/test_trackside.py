@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray
 
+from tiengine import result as results
 from tiengine.parameters.errors import InputError, RunFailedError
-from tiengine.result_files import reader as results
-from tiengine.result_files.reader import Result
+from tiengine.result import Result
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation import simulate
 from tiengine.simulation import time_loop as march

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import xarray
 
+from tiengine import result as results
 from tiengine.parameters.errors import InputError
-from tiengine.result_files import reader as results
 from tiengine.result_files.channels import BODY, DOFS, IRREGULARITY, WHEEL
 from tiengine.result_files.output_file import check_output
 from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer

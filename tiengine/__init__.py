@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tiengine.parameters.errors import InputError as InputError
-    from tiengine.result_files.reader import Result as Result
-    from tiengine.result_files.reader import open as open
+    from tiengine.result import Result as Result
+    from tiengine.result import open as open
     from tiengine.scenario.scenario import load_scenario as load_scenario
     from tiengine.simulation.simulate import resume as resume
     from tiengine.simulation.simulate import run as run
@@ -23,9 +23,9 @@ __all__ = ["InputError", "Result", "load_scenario", "open", "resume", "run"]
 
 _HOMES = {
     "InputError": "tiengine.parameters.errors",
-    "Result": "tiengine.result_files.reader",
+    "Result": "tiengine.result",
     "load_scenario": "tiengine.scenario.scenario",
-    "open": "tiengine.result_files.reader",
+    "open": "tiengine.result",
     "resume": "tiengine.simulation.simulate",
     "run": "tiengine.simulation.simulate",
 }

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from tiengine.parameters.arrays import Reals
 
 __all__ = ["Case", "Outcome", "evaluate"]
 
-Reals = NDArray[np.float64]
 Kind = Literal["verification", "validation", "full length", "convergence", "information"]
 Verdict = Literal["ok", "MISS", "for information", "left out"]
 

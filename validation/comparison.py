@@ -18,7 +18,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from validation.case import Case
 from validation.msm.simulate import FullLength
@@ -26,7 +25,6 @@ from validation.runs import Forces, full_length, simulate
 
 __all__ = ["ABSORBING", "ALL_MODES", "CASES", "Difference", "difference", "full", "window"]
 
-Reals = NDArray[np.float64]
 STEP, COARSE_STEP = 2.5e-5, 2e-4
 ALL_MODES, TRADITIONAL_MODES = 90, 20  # of a slab: its mesh has 90
 PER_METRE = 2.0

@@ -15,16 +15,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.contact.conicity import equivalent_conicity, rolling_radius_difference, wheelset_position
 from tiengine.contact.profile import load_profile
 from tiengine.contact.table import ContactSettings, WheelRailPair
+from tiengine.parameters.arrays import Reals
 from validation.case import Case
 
 __all__ = ["CASES", "draw"]
 
-Reals = NDArray[np.float64]
 INDEPENDENT = "independent calculation"
 EUROPE = {"gauge_depth": 0.014, "half_spacing": 0.75, "wheel_radius": 0.46}
 PAIRS = (

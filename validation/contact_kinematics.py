@@ -11,15 +11,14 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.engine.equilibrium import ContactForces, evaluate_contact
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
+from tiengine.parameters.arrays import Reals
 from validation.case import Case
 from validation.models import paper_model
 
-Reals = NDArray[np.float64]
 V = 350.0 / 3.6
 TRIALS, NUDGE = 200, 1e-7
 FRICTIONLESS = "track.friction=1e-12"

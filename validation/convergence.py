@@ -34,6 +34,7 @@ import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from validation.case import Case
 from validation.runs import Forces, simulate
 
@@ -42,7 +43,6 @@ __all__ = [
     "Setting", "error",
 ]  # fmt: skip
 
-Reals = NDArray[np.float64]
 START, WAY, RUN_IN = 40.0, 150.0, 40.0  # m; the longest window ends at 70 m then, its rear at 10 m
 BEFORE_LIFT, AFTER_LANDING = 0.3, 1.5  # m; errors do not depend on more
 DIRECTIONS = ("vertical", "lateral")

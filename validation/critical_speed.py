@@ -24,10 +24,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.contact.table import WheelRailPair
 from tiengine.model.from_scenario import ingredients
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import RunFailedError
 from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.simulation.simulate import run
@@ -38,8 +38,6 @@ from validation.closed_forms.linear_vehicle import critical_speed as linear_crit
 from validation.klingel import cone, fit_wave, round_head, write_kick
 
 __all__ = ["CASES", "Setting", "critical_speed"]
-
-Reals = NDArray[np.float64]
 
 SLOWEST, FASTEST, TOP, STEP = 100.0, 600.0, 1000.0, 10.0  # km/h
 DURATION, SPAN = 6.0, 1.5  # s: of a run, of either half of what is judged

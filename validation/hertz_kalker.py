@@ -13,7 +13,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.contact.hertz import hertz, zhai_G
 from tiengine.contact.kalker import kalker
@@ -21,11 +20,11 @@ from tiengine.contact.search import transverse_curvature
 from tiengine.engine.equilibrium import evaluate_contact
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
+from tiengine.parameters.arrays import Reals
 from validation.case import Case
 from validation.manchester import CONTACT, R0, REFERENCE, placed
 from validation.models import paper_model
 
-Reals = NDArray[np.float64]
 E, NU, LOAD = 2.06e11, 0.3, 70e3
 KALKER = "Kalker (1990), table E3, after CONTACT's source"
 HERTZ_TABLE = {

@@ -10,13 +10,12 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
 from tiengine.irregularity.spectrum import CHANNELS, band_variances, load_spectrum, sigma
+from tiengine.parameters.arrays import Reals
 from validation.case import Case
 
-Reals = NDArray[np.float64]
 INDEPENDENT = "independent quadrature of the published spectrum"
 LENGTH, SPACING = 20e3, 0.25
 UNITS = np.array([1e3, 1e3, 1e3, 1e3])  # m to mm, rad to mrad

@@ -25,19 +25,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tiengine.contact.table import WheelRailPair
 from tiengine.model.from_scenario import ingredients
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.simulation.simulate import run
 from validation.case import Case
 from validation.closed_forms.klingel import free_wheelset, rigid_bogie, track_conicity
 
 __all__ = ["CASES", "cone", "fit_wave", "round_head", "write_kick"]
-
-Reals = NDArray[np.float64]
 
 KMH, HALF_WHEELBASE, AXLE, HEAD_RADIUS, CORNER = 30.0, 1.25, 0.43, 0.3, 0.013
 FREE, SQUARE = 1.0, 1e9  # N/m

@@ -27,17 +27,16 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.contact.hertz import hertz
 from tiengine.contact.profile import Profile, load_profile
 from tiengine.contact.search import transverse_curvature
 from tiengine.contact.table import ContactSettings, WheelRailPair
+from tiengine.parameters.arrays import Reals
 from validation.case import Case
 
 __all__ = ["CASES", "R0", "RAIL", "REFERENCE", "WHEEL", "approach", "located", "radius"]
 
-Reals = NDArray[np.float64]
 DATA = Path(__file__).parent / "data"
 R0, B0 = 0.46, 0.75
 REFERENCE = np.genfromtxt(DATA / "manchester_contact_a22.csv", delimiter=",", names=True, skip_header=5)

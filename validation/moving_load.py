@@ -9,8 +9,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import RailWindow
 from validation.case import Case
@@ -20,7 +20,6 @@ from validation.rail import vertical_beam
 LENGTH, V, LOAD = 36.0, 350.0 / 3.6, 70e3
 K, C = 4e7 / 0.63, 5e4 / 0.63  # the paper's fastening, smeared
 PLACES = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])  # m ahead of the load
-Reals = NDArray[np.float64]
 SOURCE = "endless Timoshenko beam, residues of its Fourier transform"
 
 

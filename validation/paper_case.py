@@ -8,13 +8,12 @@ Statistics leave out the first 50 m.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from validation.case import Case
 from validation.models import paper_model
 from validation.runs import Forces, simulate
 
-Reals = NDArray[np.float64]
 PROTOTYPE = "independent prototype, another realisation"
 RUN_IN = 50.0  # m
 

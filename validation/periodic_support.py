@@ -22,7 +22,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine.engine.state import State
@@ -31,6 +30,7 @@ from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import RailWindow
 from validation.case import Case
@@ -39,7 +39,6 @@ from validation.rail import vertical_beam
 
 __all__ = ["CASES", "LADDER", "deflection_error", "exact_force", "force_error", "history", "mean_square"]
 
-Reals = NDArray[np.float64]
 LOAD, NEAR = 70e3, 10.0  # N; m from the load within which seats are compared
 RAMP, SETTLE = 3.0, 3.0  # m
 SPEEDS = (350, 250, 100)  # km/h

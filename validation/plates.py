@@ -14,8 +14,8 @@ from functools import cache
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from tiengine.track.slab import load_slab
 from tiengine.track.slab_matrices import SlabMatrices, slab_matrices
 from validation.case import Case
@@ -27,7 +27,6 @@ RITZ_DEGREE = 14
 SLAB = "CRTS_III"
 RITZ = "Ritz's method, Legendre polynomials to degree 14, rotary inertia included"
 WAVE = "(1 + nu)/48 (q h)^2, the element's dispersion at 45 degrees to the mesh"
-Reals = NDArray[np.float64]
 
 
 def dispersion(nu: float, wave: Reals, h: float) -> Reals:

@@ -11,8 +11,8 @@ from functools import cache
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.parts import Parts
 from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import RailWindow
@@ -24,7 +24,6 @@ __all__ = ["CASES", "vertical_beam"]
 LENGTH, PITCH, LOAD, SPRING = 36.0, 0.63, 70e3, 4e7
 MODES = (60, 120, 240)
 INDEPENDENT = "independent calculation, CHN60, 4e7 N/m every 0.63 m, rigid slab"
-Reals = NDArray[np.float64]
 
 
 @cache

@@ -19,6 +19,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset
 from tiengine.parameters.quantity import build
@@ -31,7 +32,6 @@ from validation.closed_forms.timoshenko import Beam, pinned_frequencies
 
 __all__ = ["CASES"]
 
-Reals = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 LOSS, PITCH = 0.01, 0.65
 FREQUENCIES = np.unique(np.concatenate([np.geomspace(1.0, 1500.0, 60), np.linspace(920.0, 960.0, 9)]))

@@ -9,7 +9,6 @@ import subprocess
 import sys
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from tiengine.engine.stability import TOLERATED_GROWTH, energy_growth
@@ -19,7 +18,6 @@ from validation.case import Case
 from validation.models import paper_model
 from validation.runs import simulate
 
-Reals = NDArray[np.float64]
 SHORT = ("train.distance=20.0", "numerics.time_step=2e-4")
 
 

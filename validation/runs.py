@@ -6,17 +6,14 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from tiengine.result_files.reader import Result
+from tiengine.parameters.arrays import Reals
+from tiengine.result import Result
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation.simulate import run
 from validation.msm.simulate import FullLength, run_full_length
 
 __all__ = ["Forces", "full_length", "simulate"]
 
-Reals = NDArray[np.float64]
 DOUBLE = 'output.precision="double"'
 
 

@@ -9,19 +9,18 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.kernels import layout as at
+from tiengine.parameters.arrays import Reals
 from tiengine.vehicle.train import static_wheel_loads
 from validation.case import Case
 from validation.models import paper_model
 from validation.runs import Forces, simulate
 
-Reals = NDArray[np.float64]
 V, DT, SLABS, STEPS = 350.0 / 3.6, 2e-4, 10, 2916  # STEPS of DT at V are SLABS of 5.67 m
 
 

@@ -8,14 +8,11 @@ out the first 50 m.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from validation.case import Case
 from validation.runs import simulate
 
 __all__ = ["CASES"]
-
-Reals = NDArray[np.float64]
 
 RUN_IN, WAY = 50.0, 200.0  # m
 SPEEDS = (200, 250, 300, 350)  # km/h

@@ -14,10 +14,10 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine.model.newmark import Newmark
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import Rail, RailWindow
 from validation.case import Case
@@ -33,7 +33,6 @@ from validation.rail import vertical_beam
 
 __all__ = ["CASES"]
 
-Reals = NDArray[np.float64]
 BRIDGE = Crossing(2.87e9 * 2.90, 2303.0, 25.0, 100.0 / 3.6, 5750.0, 1595e3)
 DAMPED = replace(BRIDGE, damping=0.05 * 2.0 * np.sqrt(1595e3 * 5750.0))
 RAIL_SPAN, RAIL_SPEED = 6.0, 350.0 / 3.6

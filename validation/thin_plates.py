@@ -15,8 +15,8 @@ from functools import cache
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from tiengine.track.mortar import Mortar
 from tiengine.track.slab import Slab, load_slab
 from tiengine.track.slab_matrices import slab_matrices
@@ -46,10 +46,9 @@ QUARTER = 6.0  # l: from the point load to the edges of the plate on its bed
 PLACES = np.array([0.0, 1.0, 2.0, 3.0, np.sqrt(2.0), np.sqrt(8.0)])
 """r/l: under the load, three places along the mesh, two along its diagonal."""
 _EXCESS = {per_radius: mesh_excess((1.0 + NU) / 48.0, 1.0 / per_radius) for per_radius in (2, 4)}
+
+
 # stiffness goes with twice the frequency, the mean over all directions is half of that at 45 degrees
-Reals = NDArray[np.float64]
-
-
 def _bed(stiffness: float) -> Mortar:
     return load_slab(SLAB)[1].model_copy(update={"stiffness": stiffness})
 

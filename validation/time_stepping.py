@@ -10,12 +10,11 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from validation.case import Case
 from validation.runs import Forces, simulate
 
-Reals = NDArray[np.float64]
 FINEST, SAMPLE = 2.5e-5, 2e-4
 STEPS = (2e-4, 1e-4, 5e-5)
 LARGEST, COMMON = 2.5e-4, 1e-3  # longest step that keeps the bound, which the speed suite takes; samples of both runs

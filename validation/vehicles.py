@@ -8,14 +8,13 @@ coach, CRH2 after Huo and Dai, Shock and Vibration 2019, 2015465.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh, expm
 
+from tiengine.parameters.arrays import Reals
 from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
 from tiengine.vehicle.vehicle import load_vehicle
 from validation.case import Case
 
-Reals = NDArray[np.float64]
 INDEPENDENT = "independent calculation from the same data sheet"
 PRINTED = {
     "CRH380A_v2": ".431 .637 .680 .891 .909 7.33 8.29 12.2 16.7 32.4",

@@ -17,11 +17,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 
 from tiengine.engine import backend
 from tiengine.model.from_scenario import ingredients
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation.simulate import run
 from tiengine.vehicle.train import assemble, static_wheel_loads
@@ -36,8 +36,6 @@ from validation.closed_forms.two_mass import (
 from validation.runs import simulate
 
 __all__ = ["CASES", "draw"]
-
-Reals = NDArray[np.float64]
 
 RUN_IN = 50.0  # m
 SHORT, LONG = 400.0, 1600.0  # m

@@ -10,13 +10,13 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.irregularity.irregularity import make_irregularity
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.simulation.simulate import prepare as prepare_window
 from validation.case import Case
@@ -25,7 +25,6 @@ from validation.msm.simulate import FullLength, load
 from validation.msm.simulate import prepare as prepare_full
 from validation.runs import Forces, full_length, simulate
 
-Reals = NDArray[np.float64]
 STEP, FINE = 1e-4, 5e-5  # a wheel flies over the failed fastenings, and the blow wants a finer step
 PITCH, SEATS_PER_SLAB = 5.67, 9
 FAILED, NEIGHBOURS = (100, 102), (97, 98, 99, 103, 104, 105)  # seats of the left rail; chainage 63 to 65 m

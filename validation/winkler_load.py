@@ -11,9 +11,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import Rail, RailWindow
 from validation.case import Case
@@ -27,7 +27,6 @@ K, C = 4e7 / 0.63, 5e4 / 0.63  # the paper's fastening, smeared
 PLACES = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])  # m ahead of the load
 SPEEDS = {"350": 350.0 / 3.6, "fast": 300.0}  # m/s; the latter: 0.14 of the stiffness is lost to m V^2
 STIFF, LIGHT = 1e5, 1e-6
-Reals = NDArray[np.float64]
 
 
 @cache

@@ -10,14 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from tiengine.track.fastening import Fastening
 from tiengine.track.rail import Rail
 from tiengine.track.slab import Slab
 from tiengine.track.slab_matrices import SlabMatrices
-
-Reals = NDArray[np.float64]
 
 
 @dataclass

@@ -18,7 +18,7 @@ import click
 
 from tiengine.cli import reading as cli_results
 from tiengine.cli import simulating as cli_run
-from tiengine.cli.screen import print_rows
+from tiengine.cli.screen import print_rows, show
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.presets import KINDS, preset_names, preset_source
 
@@ -68,7 +68,7 @@ def profile(
     if compare:
         reports = [profile_report.read_json(path) for path in compare]
         comparison = profile_report.compare(*reports)
-        profile_tables.show(profile_tables.comparison_table(comparison, [str(path) for path in compare]))
+        show(profile_tables.comparison_table(comparison, [str(path) for path in compare]))
         return
 
     from tiengine.scenario.scenario import load_scenario
@@ -90,7 +90,7 @@ def profile(
         raise SystemExit(1) from None
     if file is not None:
         file.write_text(report.to_json() + "\n", encoding="utf-8")
-    profile_tables.show(profile_tables.report_tables(report))
+    show(profile_tables.report_tables(report))
 
 
 @main.command()

@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from tiengine.cli.screen import print_rows
+from tiengine.cli.screen import print_rows, show
 from tiengine.figures.catalogue import COMPARE, names
 from tiengine.parameters.input_files import parse_toml
 from tiengine.result_files.summary import SUMMARY, summary
@@ -24,7 +24,7 @@ __all__ = ["COMMANDS"]
 @click.argument("file", type=click.Path(path_type=Path))
 def info(file: Path) -> None:
     """Say what a result FILE holds and how it was made."""
-    from tiengine.result_files import reader as results
+    from tiengine import result as results
 
     with results.open(file) as result:
         attributes = result.attributes
@@ -48,9 +48,8 @@ def info(file: Path) -> None:
 @click.option("--json", "output", type=click.Path(path_type=Path), help="Write all indices here too, replacing a file.")
 def metrics(file: Path, train: int | None, output: Path | None) -> None:
     """Indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 for a result FILE, beside their limits."""
-    from tiengine.profiling import tables as profile_tables
+    from tiengine import result as results
     from tiengine.report import metrics_table
-    from tiengine.result_files import reader as results
     from tiengine.result_files.output_file import check_output
 
     if output is not None:
@@ -59,7 +58,7 @@ def metrics(file: Path, train: int | None, output: Path | None) -> None:
         found = result.metrics(train)
     if output is not None:
         output.write_text(found.to_json() + "\n", encoding="utf-8")
-    profile_tables.show(metrics_table.metrics_table(found))
+    show(metrics_table.metrics_table(found))
 
 
 @click.command()
@@ -70,8 +69,8 @@ def metrics(file: Path, train: int | None, output: Path | None) -> None:
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def export(file: Path, output: Path, train: int, channels: Sequence[str], force: bool) -> None:
     """Write channels of a result FILE as CSV, Parquet or MATLAB (docs/results.md)."""
+    from tiengine import result as results
     from tiengine.result_files import export as exporting
-    from tiengine.result_files import reader as results
 
     with results.open(file) as result:
         written = exporting.export(result, output, train=train, channels=channels, force=force)
@@ -86,8 +85,8 @@ def export(file: Path, output: Path, train: int, channels: Sequence[str], force:
 @click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="One train of an ensemble.")
 def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, train: int) -> None:
     """Draw figures of a result FILE: one KIND, or all that it can give, into FILE_KIND.png; replaces figures."""
+    from tiengine import result as results
     from tiengine.figures.files import draw_all, draw_one
-    from tiengine.result_files import reader as results
 
     with ExitStack() as stack:
         result = stack.enter_context(results.open(file))
@@ -107,8 +106,8 @@ def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, 
 @click.option("--train", type=click.IntRange(0), help="Whose figures; default: the first that ran to its end.")
 def report(file: Path, output: Path | None, train: int | None) -> None:
     """Make one HTML page of a result FILE: scenario, key figures, indices and figures; it needs no network."""
+    from tiengine import result as results
     from tiengine.report import page as reporting
-    from tiengine.result_files import reader as results
 
     path = output or file.with_suffix(".html")
     with results.open(file) as result:

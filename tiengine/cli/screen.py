@@ -12,6 +12,8 @@ from rich.table import Table
 
 __all__ = ["PIPE_WIDTH", "print_rows", "show"]
 
+PIPE_WIDTH = 120  # columns where there is no terminal
+
 
 def print_rows(rows: Sequence[tuple[str, str]]) -> None:
     """Two columns; folded on a terminal, one line a row for a pipe."""
@@ -26,9 +28,6 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
     for row in rows:
         table.add_row(*map(escape, row))
     Console(highlight=False).print(table)
-
-
-PIPE_WIDTH = 120  # columns where there is no terminal
 
 
 def show(content: RenderableType) -> None:

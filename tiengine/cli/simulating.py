@@ -23,7 +23,7 @@ from tiengine.cli.screen import print_rows
 from tiengine.result_files.summary import summary
 
 if TYPE_CHECKING:
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["COMMANDS"]
 

@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tiengine.contact.search import Contacts
 from tiengine.contact.table import WheelRailPair
+from tiengine.parameters.arrays import Reals
 
 __all__ = ["WheelsetPosition", "equivalent_conicity", "rolling_radius_difference", "wheelset_position"]
-
-Reals = NDArray[np.float64]
 
 STEEPEST_ROLL = 0.03
 """Bracket of the roll [rad]: a flange on top of the rail rolls a wheelset by 28 mm / 1.5 m = 0.019."""

@@ -16,12 +16,12 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ellipkm1, elliprd
 
-__all__ = ["hertz", "zhai_G"]
+from tiengine.parameters.arrays import Reals
 
-Reals = NDArray[np.float64]
+__all__ = ["hertz", "zhai_G"]
 
 
 def hertz(A: ArrayLike, B: ArrayLike, E: float, nu: float) -> tuple[Reals, Reals, Reals]:

@@ -13,12 +13,12 @@ g -> 0.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-__all__ = ["asymptote_mismatch", "kalker"]
+from tiengine.parameters.arrays import Reals
 
-Reals = NDArray[np.float64]
+__all__ = ["asymptote_mismatch", "kalker"]
 
 # rows: a/b = 0.1, 0.2 ... 1.0, then 1/0.9, 1/0.8 ... 1/0.1
 _TENTHS = np.arange(1, 11) / 10.0

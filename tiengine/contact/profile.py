@@ -21,18 +21,16 @@ from importlib import resources
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from tiengine.contact.profile_files import read_profile
 from tiengine.contact.profile_frame import FEWEST_POINTS, Kind, increasing_run, placed, smoothing_curve
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import is_file
 
 __all__ = ["Kind", "Profile", "load_profile", "profile_names"]
-
-Reals = NDArray[np.float64]
 
 ROUNDING_LENGTH = 5e-5
 """Default smoothing length l [m]: leaves 1 % of curvature noise on CHN60_analytic's 0.05 mm list."""

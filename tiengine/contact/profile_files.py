@@ -20,15 +20,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.contact.profile_frame import FEWEST_POINTS, Kind, PointList, check_kinks, oriented
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import LARGEST_PROFILE, numbers_of, read_text_file
 
 __all__ = ["FORMATS", "MOST_POINTS", "read_profile"]
-
-Reals = NDArray[np.float64]
 
 MOST_POINTS = 20_000  # a laser gives some thousand
 LARGEST_FACTOR = 1e6  # of units

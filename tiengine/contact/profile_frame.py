@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_smoothing_spline
 
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 
 __all__ = [
@@ -30,7 +31,6 @@ __all__ = [
     "smoothing_curve",
 ]
 
-Reals = NDArray[np.float64]
 Kind = Literal["wheel", "rail"]
 
 FEWEST_POINTS = 10

@@ -18,11 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tiengine.contact.profile import Profile
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 
 __all__ = ["Contacts", "find_contacts", "transverse_curvature"]
-
-Reals = NDArray[np.float64]
 
 STATION_STEP = 0.2e-3
 CANDIDATE_BAND = 10e-6

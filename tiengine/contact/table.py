@@ -24,12 +24,11 @@ from tiengine.contact.hertz import hertz, zhai_G
 from tiengine.contact.kalker import kalker
 from tiengine.contact.profile import Profile
 from tiengine.contact.search import Contacts, find_contacts, transverse_curvature
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
 
 __all__ = ["ContactSettings", "ContactTable", "WheelRailPair", "build_contact_table"]
-
-Reals = NDArray[np.float64]
 
 GAUSSIAN_REACH = 5.0
 """The Gaussian is cut at this many standard deviations (6e-7 of it is lost and normalised away)."""

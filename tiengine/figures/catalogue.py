@@ -11,7 +11,7 @@ from tiengine.parameters.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["COMPARE", "KINDS", "Kind", "kind_named", "names"]
 
@@ -40,7 +40,8 @@ class Kind:
             arguments: Number of the train; before it, for ``compare``, the second file.
 
         Raises:
-            InputError: The file cannot give it; an :class:`tiengine.indices.train_record.AbsentError` if it lacks a group.
+            InputError: The file cannot give it; an ``AbsentError`` (:mod:`tiengine.indices.train_record`)
+                if it lacks a group.
         """
         figure: Figure = import_module(f"tiengine.figures.{self.name}").draw(result, *arguments)
         return figure

@@ -6,23 +6,21 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.figures.curve import Band, Curve, bins_for
 from tiengine.figures.palette import BLACK, GREY
 from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure
 from tiengine.indices.train_record import Samples, Train
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["draw"]
-
-Reals = NDArray[np.float64]
 
 CHANNELS = {"vertical_force": "Vertical", "lateral_force": "Lateral"}
 LEAST_WAY = 1.0  # m that both must have run

@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 from tiengine.figures.palette import BLACK
 from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure, plain
 from tiengine.indices.train_record import AbsentError, Train
+from tiengine.parameters.arrays import Reals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from tiengine.contact.profile import Profile
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["draw"]
-
-Reals = NDArray[np.float64]
 
 BIN = 0.25e-3  # m along the profile
 MARGIN = 4e-3  # m beyond the outermost contact

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tiengine.parameters.arrays import Reals
 
 __all__ = ["BINS", "Band", "Curve", "bins_for"]
-
-Reals = NDArray[np.float64]
 
 BINS = 1600
 """Bins along a figure's width: a fifteenth of a millimetre each in print."""

@@ -5,23 +5,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.figures.curve import Band
 from tiengine.figures.palette import BLUE, GREY, SKY, VERMILION
 from tiengine.figures.style import in_style, new_figure
 from tiengine.indices.train_record import AbsentError, Samples, Train
+from tiengine.parameters.arrays import Reals
 from tiengine.result_files.reader import COMPLETE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["draw"]
-
-Reals = NDArray[np.float64]
 
 STRETCH = 2.0  # m
 STRETCHES = 300  # at most

@@ -13,7 +13,7 @@ from tiengine.parameters.errors import InputError
 from tiengine.result_files.output_file import check_output
 
 if TYPE_CHECKING:
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["draw_all", "draw_one"]
 

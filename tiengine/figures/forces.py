@@ -14,16 +14,15 @@ from tiengine.indices import en14363, gb5599
 from tiengine.indices.filters import sliding_mean
 from tiengine.indices.ride import FORCE_CUT_OFF, LEAST_RATE, UNLOADED
 from tiengine.indices.train_record import AbsentError, Samples, Train
+from tiengine.parameters.arrays import Reals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["draw"]
-
-Reals = NDArray[np.float64]
 
 MEAN = 2.0  # m, of the standards' sliding means
 OUTWARD = np.array([-1.0, 1.0])  # of a lateral force to the right, left and right wheel

@@ -12,16 +12,15 @@ from tiengine.figures.curve import Curve
 from tiengine.figures.palette import BLUE, VERMILION
 from tiengine.figures.style import Look, in_style, new_figure, plain
 from tiengine.indices.train_record import AbsentError, Train
+from tiengine.parameters.arrays import Reals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["draw"]
-
-Reals = NDArray[np.float64]
 
 MOST = 8  # gauges a figure
 LATERAL, VERTICAL = Look(VERMILION, "--"), Look(BLUE, "-")

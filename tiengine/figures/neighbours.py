@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_seats", "draw_slabs", "worst_defect"]
 
-Reals = NDArray[np.float64]
-
 NEXT = 2  # neighbours on either side whose ratio is written
 
 

@@ -15,7 +15,7 @@ from tiengine.parameters.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["draw"]
 
@@ -24,8 +24,8 @@ __all__ = ["draw"]
 def draw(result: Result, train: int = 0) -> Figure:
     """Lateral and vertical acceleration over either bogie, left of the centre line, 0.4 to 10 Hz, behind the run-in.
 
-    The points are those of the indices (:mod:`tiengine.indices.ride`). Holds one value a sample of the bodies in memory, as
-    the indices do.
+    The points are those of the indices (:mod:`tiengine.indices.ride`). Holds one value a sample of the bodies in
+    memory, as the indices do.
 
     Args:
         result: An open file.

@@ -10,24 +10,22 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 
 from tiengine.figures.palette import BLACK, BLUE, GREEN, ORANGE
 from tiengine.figures.style import LEFT, RIGHT, Look, in_style, new_figure, plain
 from tiengine.indices.p2_resonance import p2_of
 from tiengine.indices.train_record import SLICE, AbsentError, Samples, Train
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.contact_settings import contact_settings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["draw", "passing_frequencies", "welch"]
-
-Reals = NDArray[np.float64]
 
 LONGEST_SEGMENT = 1.0  # s, 1 Hz
 SEGMENTS_END_TO_END = 4  # at least: seven with their overlaps

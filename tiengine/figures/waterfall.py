@@ -6,21 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import Normalize
-from numpy.typing import NDArray
 
 from tiengine.figures.palette import BLACK, SKY
 from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure
 from tiengine.indices.train_record import AbsentError, Train
+from tiengine.parameters.arrays import Reals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["draw", "largest_by_stretch"]
-
-Reals = NDArray[np.float64]
 
 ROWS = 400  # a picture's, at most
 SLICE = 200  # snapshots in memory at a time

@@ -15,15 +15,13 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.indices.filters import block_rms, weighted
 from tiengine.indices.index import Index, worst
 from tiengine.indices.ride import FloorPoint, Ride
+from tiengine.parameters.arrays import Reals
 
 __all__ = ["en12299_indices", "iso2631_indices", "mean_comfort", "total_rms"]
-
-Reals = NDArray[np.float64]
 
 EN, ISO = "EN 12299:2009", "ISO 2631-1:1997"
 BLOCK, BLOCKS = 5.0, 60  # s; least number: five minutes

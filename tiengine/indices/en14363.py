@@ -15,11 +15,11 @@ from bisect import bisect_left
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.indices.filters import band_pass, sliding_mean
 from tiengine.indices.index import Index, worst
 from tiengine.indices.ride import Ride
+from tiengine.parameters.arrays import Reals
 
 __all__ = [
     "QUOTIENT_LIMIT",
@@ -30,8 +30,6 @@ __all__ = [
     "wheel_force_limit",
     "wheel_indices",
 ]
-
-Reals = NDArray[np.float64]
 
 STANDARD = "EN 14363:2016"
 SAFETY, OTHER = 3.0, 2.2  # k: running safety; track loading and ride characteristics

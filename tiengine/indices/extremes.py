@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.indices.train_record import AbsentError, Train
+from tiengine.parameters.arrays import Reals
 
 __all__ = ["Extremes", "read_extremes"]
-
-Reals = NDArray[np.float64]
 
 FACTORS = {"seats": "factor", "slabs": "mortar_factor"}
 REACH = {"seats": 10, "slabs": 2}

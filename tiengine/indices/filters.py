@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from scipy import fft, signal
 from scipy.integrate import cumulative_trapezoid
 
-__all__ = ["WEIGHTINGS", "Weighting", "band_pass", "block_rms", "low_pass", "sliding_mean", "weighted"]
+from tiengine.parameters.arrays import Reals
 
-Reals = NDArray[np.float64]
+__all__ = ["WEIGHTINGS", "Weighting", "band_pass", "block_rms", "low_pass", "sliding_mean", "weighted"]
 
 _TWO_PASSES = (np.sqrt(2.0) - 1.0) ** 0.25  # two passes of 1/(1 + r^4) are 1/sqrt(2) at this r
 _DECAY = 10.0  # s until the band limit at 0.4 Hz has forgotten all but 2e-8

@@ -20,12 +20,12 @@ from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from tiengine.indices.filters import band_pass, sliding_mean
 from tiengine.indices.index import Index, worst
 from tiengine.indices.ride import FloorPoint, Forces, Ride
+from tiengine.parameters.arrays import Reals
 
 __all__ = [
     "axle_force_limit",
@@ -37,7 +37,6 @@ __all__ = [
     "wheel_indices",
 ]
 
-Reals = NDArray[np.float64]
 Direction = Literal["vertical", "lateral"]
 
 STANDARD = "GB/T 5599-2019"

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.indices.extremes import Extremes, read_extremes
 from tiengine.indices.train_record import AbsentError, Samples, Train
+from tiengine.parameters.arrays import Reals
 
 __all__ = ["KeyFigure", "Summary", "key_figures", "summarise"]
-
-Reals = NDArray[np.float64]
 
 SIDES = ("left", "right")
 

@@ -12,9 +12,10 @@ from tiengine.indices import comfort, en14363, gb5599
 from tiengine.indices.index import Index
 from tiengine.indices.ride import Ride
 from tiengine.parameters.errors import InputError
+from tiengine.scenario.recorded import recorded_scenario
 
 if TYPE_CHECKING:
-    from tiengine.result_files.reader import Result
+    from tiengine.result_files.reader import Reader
     from tiengine.scenario.scenario import Scenario
 
 __all__ = ["Metrics", "Spread", "TrainMetrics", "evaluate"]
@@ -101,7 +102,7 @@ class Metrics:
         return json.dumps(tables, indent=2)
 
 
-def evaluate(result: Result, train: int | None = None) -> Metrics:
+def evaluate(result: Reader, train: int | None = None) -> Metrics:
     """Compute the indices of a result.
 
     Args:
@@ -119,11 +120,11 @@ def evaluate(result: Result, train: int | None = None) -> Metrics:
     done = [i for i in asked if i not in failed]
     if not done:
         raise InputError(f"{result.name}: no train has run to its end: {next(iter(failed.values()), 'there is none')}")
-    members = result.scenario.members
+    members = recorded_scenario(result).members
     return Metrics(result.name, tuple(_train(result, i, members[i]) for i in done), failed)
 
 
-def _train(result: Result, train: int, scenario: Scenario) -> TrainMetrics:
+def _train(result: Reader, train: int, scenario: Scenario) -> TrainMetrics:
     ride = Ride(result, train, scenario)
     vehicles = range(len(ride.vehicles))
     return TrainMetrics(train, ride.way, tuple(x for v in vehicles for method in METHODS for x in method(ride, v)))

@@ -16,20 +16,19 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.indices.filters import low_pass
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
+from tiengine.scenario.recorded import recorded_scenario
 from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
 
 if TYPE_CHECKING:
-    from tiengine.result_files.reader import Result
+    from tiengine.result_files.reader import Reader
     from tiengine.scenario.scenario import Scenario
     from tiengine.vehicle.vehicle import Vehicle
 
 __all__ = ["FORCE_CUT_OFF", "FloorPoint", "Forces", "Ride"]
-
-Reals = NDArray[np.float64]
 
 FLOOR_HEIGHT = 1.25  # m above the rail: that of high-speed platforms; vehicle data do not give it
 FLOOR_OFFSET = 1.0  # m beside the centre line, as GB/T 5599 has it
@@ -86,7 +85,7 @@ class Ride:
         speed: Largest speed [m/s].
     """
 
-    def __init__(self, result: Result, train: int = 0, scenario: Scenario | None = None) -> None:
+    def __init__(self, result: Reader, train: int = 0, scenario: Scenario | None = None) -> None:
         """Check what is there; nothing but times is read yet.
 
         Args:
@@ -98,7 +97,7 @@ class Ride:
             InputError: The file lacks what the indices need, is sampled too rarely, or the run is too short.
         """
         self._where = f"{result.name}: train {train}"
-        scenario = scenario or result.scenario_of(train)
+        scenario = scenario or recorded_scenario(result).members[train]
         self._wheel = self._group(result[f"trains/{train:03d}"], "wheel", ("lateral_force", "vertical_force"))
         self._body = self._group(result[f"trains/{train:03d}"], "body", ("acceleration",))
         self._parts = scenario.parts

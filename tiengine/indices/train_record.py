@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.indices.filters import low_pass
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
-from tiengine.parameters.input_files import parse_toml
+from tiengine.scenario.recorded import recorded_scenario
 from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
 
 if TYPE_CHECKING:
-    from tiengine.result_files.reader import Result
+    from tiengine.result_files.reader import Reader
     from tiengine.scenario.scenario import Scenario
 
 __all__ = ["AbsentError", "Samples", "Train"]
-
-Reals = NDArray[np.float64]
 
 SLICE = 2**15  # samples in memory at a time
 SETTLING = 10.0  # periods of the cut-off that a filter needs at either end of a slice; it forgets within one
@@ -132,7 +130,7 @@ class Train:
         caption: File, scenario and train, for a figure's head.
     """
 
-    def __init__(self, result: Result, number: int = 0) -> None:
+    def __init__(self, result: Reader, number: int = 0) -> None:
         """Look at a train; nothing is read yet.
 
         Raises:
@@ -148,7 +146,7 @@ class Train:
     @cached_property
     def scenario(self) -> Scenario:
         """The train's own."""
-        return members_of(self.result)[self.number]
+        return recorded_scenario(self.result).members[self.number]
 
     @cached_property
     def model(self) -> TrainModel:
@@ -199,16 +197,3 @@ class Train:
     def _where(self) -> str:
         several = f": train {self.number}" if self.result.trains > 1 else ""
         return f"{Path(self.result.name).name}{several}"
-
-
-def members_of(result: Result) -> tuple[Scenario, ...]:
-    """Scenarios of all trains of a file."""
-    return _members(result.scenario_toml)
-
-
-@lru_cache(maxsize=2)
-def _members(text: str) -> tuple[Scenario, ...]:
-    """Of the scenario's text: a report draws ten figures, and a large ensemble's trains take seconds to build."""
-    from tiengine.scenario.scenario import load_scenario  # Taichi comes with it
-
-    return load_scenario(parse_toml(text, "scenario")).members

@@ -1,14 +1,14 @@
-"""Tracks that are given: a measured series (:mod:`tiengine.irregularity.measured_files`), or a user's function of chainage."""
+"""Given tracks: a measured series (:mod:`tiengine.irregularity.measured_files`) or a user's function of chainage."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from tiengine.irregularity.random_track import BlockSpline, sampled_spline
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 
 __all__ = [
@@ -19,7 +19,6 @@ __all__ = [
     "smooth_step",
 ]
 
-Reals = NDArray[np.float64]
 UserFunction = Callable[[Reals], tuple[Reals | float, Reals | float, Reals | float, Reals | float]]
 """Chainages (n,) to z_v, y_a, theta, gauge [m, m, rad, m], each (n,) or a number."""
 

@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from typing import Annotated, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator
 
 from tiengine.irregularity.given_track import FunctionTrack, MeasuredTrack, UserFunction, function_spline, smooth_step
@@ -25,6 +24,7 @@ from tiengine.irregularity.spectrum import (
     load_spectrum,
     spectrum_names,
 )
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.quantity import Params, Q
 
@@ -37,8 +37,6 @@ __all__ = [
     "from_function",
     "make_irregularity",
 ]
-
-Reals = NDArray[np.float64]
 
 HALF_BASE = 0.75
 """b_i [m]: half the distance over which the cross level is an angle."""

@@ -28,16 +28,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.input_files import LARGEST_TRACK, numbers_of, read_text_file
 
 __all__ = ["LEVEL_BASE", "band_passed", "read_series"]
-
-Reals = NDArray[np.float64]
 
 LEVEL_BASE = 1.5
 """Distance over which a cross level is a height [m]: 2 b_i."""

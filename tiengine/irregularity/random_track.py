@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from tiengine.irregularity.spectrum import Density, band_variances
+from tiengine.parameters.arrays import Reals
 
 __all__ = ["BlockSpline", "NoiseBlocks", "noise_spline", "sampled_spline"]
-
-Reals = NDArray[np.float64]
 
 POINTS_PER_WAVE = 8
 """Grid points per shortest wave: the spline's images of a wave then hold (1/7)^8 = 2e-7 of its power."""

@@ -15,9 +15,9 @@ from functools import cache
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset
@@ -38,7 +38,6 @@ __all__ = [
     "spectrum_names",
 ]
 
-Reals = NDArray[np.float64]
 Density = Callable[[Reals], Reals]
 
 CHANNELS = ("vertical", "alignment", "cross_level", "gauge")

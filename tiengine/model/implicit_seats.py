@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from tiengine.model.newmark import Newmark, inverse
 from tiengine.track.fastening import Fastening
 from tiengine.track.rail import RailWindow
 from tiengine.track.slab_matrices import SlabMatrices

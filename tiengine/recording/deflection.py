@@ -6,17 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
+from tiengine.parameters.arrays import Reals
 from tiengine.result_files.layout import Block
 from tiengine.track.plate_shapes import W, element_dofs, locate, tabulate_shapes
 from tiengine.track.slab import Slab
 
 __all__ = ["Deflection", "window_points"]
-
-Reals = NDArray[np.float64]
 
 POINT_SPACING = 0.25
 """About the distance of the points [m]: two or three between neighbouring seats."""

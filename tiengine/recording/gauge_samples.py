@@ -15,12 +15,12 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
+from tiengine.parameters.arrays import Reals
 from tiengine.recording.seat_envelopes import watched_seats
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION
 from tiengine.result_files.layout import Block
@@ -28,8 +28,6 @@ from tiengine.scenario.gauges import Gauge, nearest_seat, slab_under
 from tiengine.track.plate_shapes import W, shapes_at
 
 __all__ = ["GaugeSamples", "gauge_samples"]
-
-Reals = NDArray[np.float64]
 
 ROWS = (at.U, at.V, at.A)
 SIDES = {"left": 0, "right": 1}

@@ -11,17 +11,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
+from tiengine.parameters.arrays import Reals
 from tiengine.result_files.layout import Block
 
 __all__ = ["SeatEnvelopes", "watched_seats"]
-
-Reals = NDArray[np.float64]
 
 
 def watched_seats(model: Model) -> tuple[int, int]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
+from tiengine.parameters.arrays import Reals
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.plate_shapes import moment_operator

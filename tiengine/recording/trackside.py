@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
+from tiengine.parameters.arrays import Reals
 from tiengine.recording.deflection import Deflection
 from tiengine.recording.gauge_samples import gauge_samples
 from tiengine.recording.seat_envelopes import SeatEnvelopes
@@ -27,8 +27,6 @@ from tiengine.scenario.scenario import Scenario
 from tiengine.track.slab import Slab
 
 __all__ = ["Trackside", "Watcher", "trackside_groups"]
-
-Reals = NDArray[np.float64]
 
 
 class Watcher(Protocol):

@@ -1,7 +1,7 @@
 """What ``tiengine contact`` shows of a wheel on a rail: rolling-radius difference, conicity, points of contact.
 
-The wheelset is shifted sideways on straight track, its roll follows (:mod:`tiengine.contact.conicity`). Conicity is that of
-harmonic linearisation; what EN 15302 gets by integrating the motion is compared in ``docs/files.md``.
+The wheelset is shifted sideways on straight track, its roll follows (:mod:`tiengine.contact.conicity`). Conicity is that
+of harmonic linearisation; what EN 15302 gets by integrating the motion is compared in ``docs/files.md``.
 """
 
 from __future__ import annotations
@@ -12,20 +12,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.contact.conicity import equivalent_conicity, wheelset_position
 from tiengine.contact.profile import Profile
 from tiengine.contact.table import ContactSettings, WheelRailPair
 from tiengine.figures.palette import BLUE, GREEN, ORANGE, VERMILION
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["ContactReport", "contact_report", "draw"]
-
-Reals = NDArray[np.float64]
 
 REFERENCE_AMPLITUDE = 3e-3
 """Amplitude at which conicities are compared [m], EN 15302."""

@@ -28,7 +28,7 @@ from tiengine.result_files.reader import COMPLETE
 from tiengine.result_files.summary import summary
 
 if TYPE_CHECKING:
-    from tiengine.result_files.reader import Result
+    from tiengine.result import Result
 
 __all__ = ["render", "write"]
 

@@ -1,1 +1,1 @@
-"""Result files: their layout, writing and reading, journal, checkpoints, exports."""
+"""Reader files: their layout, writing and reading, journal, checkpoints, exports."""

@@ -19,7 +19,7 @@ from tiengine.parameters.errors import InputError, nearest
 from tiengine.result_files.reader import OPTIONAL
 
 if TYPE_CHECKING:
-    from tiengine.result_files.reader import Result
+    from tiengine.result_files.reader import Reader
 
 __all__ = ["ChannelTable", "Column", "channel_table", "chosen", "labels_of"]
 
@@ -75,7 +75,7 @@ class ChannelTable:
             yield [column for block in blocks for column in block.reshape(len(block), -1).T]
 
 
-def chosen(result: Result, train: int, names: Sequence[str]) -> dict[str, Any]:
+def chosen(result: Reader, train: int, names: Sequence[str]) -> dict[str, Any]:
     """Datasets of some channels.
 
     Args:
@@ -105,7 +105,7 @@ def chosen(result: Result, train: int, names: Sequence[str]) -> dict[str, Any]:
     return found
 
 
-def channel_table(result: Result, train: int = 0, names: Sequence[str] = ()) -> ChannelTable:
+def channel_table(result: Reader, train: int = 0, names: Sequence[str] = ()) -> ChannelTable:
     """Some channels of one train as a table.
 
     Args:

@@ -22,7 +22,7 @@ from tiengine.result_files.channel_table import ChannelTable, channel_table, cho
 from tiengine.result_files.output_file import check_output
 
 if TYPE_CHECKING:
-    from tiengine.result_files.reader import Result
+    from tiengine.result_files.reader import Reader
 
 __all__ = ["export"]
 
@@ -33,7 +33,7 @@ MAT_NAME = 63  # longest name in MATLAB
 
 
 def export(
-    result: Result, path: Path | str, *, train: int = 0, channels: Sequence[str] = (), force: bool = False
+    result: Reader, path: Path | str, *, train: int = 0, channels: Sequence[str] = (), force: bool = False
 ) -> str:
     """Write channels of one train into a file whose suffix says the format.
 
@@ -59,7 +59,7 @@ def export(
     return _FORMATS[path.suffix](result, path, train, channels)
 
 
-def _write_csv(result: Result, path: Path, train: int, channels: Sequence[str]) -> str:
+def _write_csv(result: Reader, path: Path, train: int, channels: Sequence[str]) -> str:
     table = channel_table(result, train, channels)
     with _replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -70,7 +70,7 @@ def _write_csv(result: Result, path: Path, train: int, channels: Sequence[str]) 
     return _size(table)
 
 
-def _write_parquet(result: Result, path: Path, train: int, channels: Sequence[str]) -> str:
+def _write_parquet(result: Reader, path: Path, train: int, channels: Sequence[str]) -> str:
     try:
         import pyarrow as pa
         from pyarrow import parquet
@@ -90,7 +90,7 @@ def _write_parquet(result: Result, path: Path, train: int, channels: Sequence[st
     return _size(table)
 
 
-def _write_mat(result: Result, path: Path, train: int, channels: Sequence[str]) -> str:
+def _write_mat(result: Reader, path: Path, train: int, channels: Sequence[str]) -> str:
     from scipy.io import savemat
 
     found = chosen(result, train, channels)
@@ -110,7 +110,7 @@ def _write_mat(result: Result, path: Path, train: int, channels: Sequence[str]) 
     return f"{len(found)} channels"
 
 
-_FORMATS: dict[str, Callable[[Result, Path, int, Sequence[str]], str]] = {
+_FORMATS: dict[str, Callable[[Reader, Path, int, Sequence[str]], str]] = {
     ".csv": _write_csv,
     ".parquet": _write_parquet,
     ".mat": _write_mat,
@@ -143,7 +143,7 @@ def _add(struct: dict[str, Any], name: str, dataset: Any) -> None:
     struct.setdefault("units", {})[key] = str(dataset.attrs.get("units", "1"))
 
 
-def _facts(result: Result, train: int) -> dict[str, Any]:
+def _facts(result: Reader, train: int) -> dict[str, Any]:
     """Whence the numbers come: file, train, scenario and the train's own attributes."""
     own: dict[str, Any] = {}
     for name, value in result.facts(train).items():

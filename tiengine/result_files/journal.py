@@ -51,7 +51,7 @@ class JournalledFile(io.RawIOBase):
         """
         super().__init__()
         self.path = path
-        self._file: BinaryIO = Path(path).open("x+b" if fresh else "r+b", buffering=0)
+        self._file: BinaryIO = Path(path).open("x+b" if fresh else "r+b", buffering=0)  # noqa: SIM115
         self._size = self._committed = os.fstat(self._file.fileno()).st_size
         self._position = 0
         self._pages: dict[int, bytearray] = {}

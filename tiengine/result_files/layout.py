@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from tiengine.result_files.channels import DIRECTIONS, DOFS, GROUPS, SIDES, Channel
 
 __all__ = ["CHUNK", "DTYPES", "SEAT", "SLAB", "TIME", "Axis", "Block", "GroupSpec", "TrainLabels"]
-
-Reals = NDArray[np.float64]
 
 CHUNK = 1000  # samples: a chunk of a coach's channel is 32 kB
 

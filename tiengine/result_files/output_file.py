@@ -1,8 +1,8 @@
 """The life of a result file: created, locked, committed now and then, completed; or continued after a crash.
 
 The file has its name from its first commit on, so that it can be read while the run goes on, and what was committed
-survives whatever happens to the process (:mod:`tiengine.result_files.journal`). While it replaces an older file (``force``), it gets
-its name only once it holds something.
+survives whatever happens to the process (:mod:`tiengine.result_files.journal`). While it replaces an older
+file (``force``), it gets its name only once it holds something.
 """
 
 from __future__ import annotations
@@ -25,8 +25,7 @@ from tiengine.parameters.errors import InputError
 from tiengine.result_files.checkpoint import checkpoint_paths
 from tiengine.result_files.file_lock import locked, release, sweep
 from tiengine.result_files.journal import JournalledFile, journal_of, recover, sync_folder
-from tiengine.result_files.reader import COMPLETE, FORMAT, FORMAT_VERSION, RUNNING, Result
-from tiengine.result_files.reader import open as open_result
+from tiengine.result_files.reader import COMPLETE, FORMAT, FORMAT_VERSION, RUNNING, Reader, open_reader
 
 __all__ = ["OutputFile", "check_output", "header"]
 
@@ -71,7 +70,7 @@ def check_output(path: Path, force: bool = False) -> None:
 
 def _is_unfinished(path: Path) -> bool:
     try:
-        with open_result(path) as result:
+        with open_reader(path) as result:
             return not result.finished
     except InputError:
         return False
@@ -130,13 +129,13 @@ class OutputFile:
         Raises:
             InputError: It is not an unfinished result, cannot be written, or another run writes it.
         """
-        with open_result(path):  # says what is wrong with a foreign file, and touches none
+        with open_reader(path):  # says what is wrong with a foreign file, and touches none
             pass
         lock = locked(path)
         try:
             recover(path)
             sweep(path)
-            with open_result(path) as result:
+            with open_reader(path) as result:
                 if result.finished:
                     _remove_checkpoints(path)
                     raise InputError(f"{path}: is complete; there is nothing to resume")
@@ -170,7 +169,7 @@ class OutputFile:
         except (OSError, RuntimeError) as error:  # h5py says RuntimeError when the disk is full
             raise InputError(f"output = '{self.path}': cannot be written ({error})") from None
 
-    def complete(self, attributes: Mapping[str, Any]) -> Result:
+    def complete(self, attributes: Mapping[str, Any]) -> Reader:
         """Write the last attributes and close.
 
         Args:
@@ -184,7 +183,7 @@ class OutputFile:
         """
         self.h5.attrs.update({"status": COMPLETE} | dict(attributes))
         if self._journalled is None or self.path is None:
-            return Result(self.h5, "in memory")
+            return Reader(self.h5, "in memory")
         try:
             self.h5.close()
             self._journalled.commit()
@@ -194,7 +193,7 @@ class OutputFile:
         self._journalled.close()
         _remove_checkpoints(self.path)
         release(self._lock)
-        return Result(h5py.File(self.path, "r"), str(self.path))
+        return Reader(h5py.File(self.path, "r"), str(self.path))
 
     def leave(self, keep: bool) -> None:
         """Close without completing.

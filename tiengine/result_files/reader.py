@@ -9,25 +9,19 @@ import re
 import zlib
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.parameters.errors import InputError, nearest
-from tiengine.parameters.input_files import is_file, parse_toml
+from tiengine.parameters.input_files import is_file
 from tiengine.result_files.damage import check_train, readable, unreadable
 from tiengine.result_files.file_lock import settle
 from tiengine.result_files.journal import journal_of
 
-if TYPE_CHECKING:
-    import xarray
-
-    from tiengine.indices.metrics import Metrics
-    from tiengine.scenario.scenario import Scenario
-
-__all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "RUNNING", "Result", "open"]
+__all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "RUNNING", "Reader", "open_file", "open_reader"]
 
 FORMAT = "tiengine"
 FORMAT_VERSION = 1
@@ -47,25 +41,26 @@ OPTIONAL = {
 """Groups of a train that a run may do without, and what to set for them."""
 
 
-class Result:
+class Reader:
     """A result file, open for reading; use as a context manager or :meth:`close` it.
 
     Attributes:
+        file: The open HDF5 file.
         name: Path of the file, for messages.
     """
 
     def __init__(self, file: Any, name: str) -> None:
-        """Take over an open file, as :func:`open` and the writer do.
+        """Take over an open file, as :func:`open_file` and the writer give it.
 
         Args:
             file: The open HDF5 file.
             name: Its path.
         """
-        self._file = file
+        self.file = file
         self.name = name
         self._checked: set[str] = set()
 
-    def __enter__(self) -> Result:
+    def __enter__(self) -> Self:
         """The result itself."""
         return self
 
@@ -89,16 +84,16 @@ class Result:
 
     def _at(self, path: str) -> Any:
         if (found := TRAIN.match(path.strip("/"))) is not None and found[0] not in self._checked:
-            if found[0] in self._file:
-                check_train(self._file[found[0]], f"{self.name}: {found[0]}")
+            if found[0] in self.file:
+                check_train(self.file[found[0]], f"{self.name}: {found[0]}")
             self._checked.add(found[0])
-        if path in self._file:
-            return self._file[path]
+        if path in self.file:
+            return self.file[path]
         trains, train, group = (*path.strip("/").split("/"), "", "", "")[:3]
-        if group in OPTIONAL and f"{trains}/{train}" in self._file and f"{trains}/{train}/{group}" not in self._file:
+        if group in OPTIONAL and f"{trains}/{train}" in self.file and f"{trains}/{train}/{group}" not in self.file:
             raise InputError(f"{self.name}: no {group!r}; set {OPTIONAL[group]} in the scenario and run it again")
         known: list[str] = []
-        self._file.visit(known.append)
+        self.file.visit(known.append)
         raise InputError(f"{self.name}: no {path!r}{nearest(path.strip('/'), known)}")
 
     def __repr__(self) -> str:
@@ -126,7 +121,7 @@ class Result:
     def attributes(self) -> dict[str, Any]:
         """Root attributes: versions, scenario, DOFs, step, wall times."""
         with readable(self.name):
-            return {key: _plain(value) for key, value in self._file.attrs.items()}
+            return {key: _plain(value) for key, value in self.file.attrs.items()}
 
     @property
     def scenario_toml(self) -> str:
@@ -136,9 +131,9 @@ class Result:
             InputError: It is missing, damaged, or too large.
         """
         with readable(self.name):
-            text = str(self._file.attrs["scenario"])
-            has_checksum = CHECKSUM in set(self._file.attrs)  # "get" would take a damaged one for none
-            checksum = self._file.attrs[CHECKSUM] if has_checksum else None
+            text = str(self.file.attrs["scenario"])
+            has_checksum = CHECKSUM in set(self.file.attrs)  # "get" would take a damaged one for none
+            checksum = self.file.attrs[CHECKSUM] if has_checksum else None
         if len(text) > LARGEST_SCENARIO:
             raise InputError(
                 f"{self.name}: scenario: {len(text) / 1e6:g} MB, larger than {LARGEST_SCENARIO / 1e6:g} MB"
@@ -146,13 +141,6 @@ class Result:
         if checksum is not None and zlib.crc32(text.encode("utf-8", "surrogateescape")) != checksum:
             raise InputError(f"{self.name}: scenario: damaged: its checksum is another one")
         return text
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario that was run."""
-        from tiengine.scenario.scenario import load_scenario  # Taichi comes with it: not for those who only read
-
-        return load_scenario(parse_toml(self.scenario_toml, f"{self.name}: scenario"))
 
     def check(self) -> None:
         """Look at every train, as nothing else does before it is asked for.
@@ -193,17 +181,9 @@ class Result:
             InputError: There is no such train.
         """
         with readable(self.name):
-            if (path := f"trains/{train:03d}") in self._file:  # not all of it is checked for its attributes
-                return {key: _plain(value) for key, value in self._file[path].attrs.items()}
+            if (path := f"trains/{train:03d}") in self.file:  # not all of it is checked for its attributes
+                return {key: _plain(value) for key, value in self.file[path].attrs.items()}
         return dict(self[path].attrs)  # says what is there instead
-
-    def scenario_of(self, train: int) -> Scenario:
-        """The scenario of one train of an ensemble, by itself.
-
-        Args:
-            train: Index of the train.
-        """
-        return self.scenario.members[train]
 
     def group(self, name: str, train: int = 0) -> dict[str, NDArray[Any]]:
         """All of one group in memory.
@@ -250,52 +230,24 @@ class Result:
         """All gauges by name; channels have shape (time, direction) or, on a fastening, (time,)."""
         return {name: self.group(f"gauges/{name}", train) for name in self[f"trains/{train:03d}/gauges"]}
 
-    def to_xarray(self, group: str = "wheel", train: int | None = 0) -> xarray.Dataset:
-        """One group as an xarray dataset with its coordinates, units and names.
-
-        Args:
-            group: ``"wheel"``, ``"body"``, ``"gauges/bridge"``.
-            train: Index of the train: channels are read when asked for, while this result is open. None stacks all
-                trains in memory, along the dimension ``train``.
-
-        Raises:
-            InputError: No such train or group, trains that cannot be stacked, or xarray is missing.
-        """
-        from tiengine.result_files.xarray_datasets import (  # xarray takes a second to import
-            open_dataset,
-            stacked_dataset,
-        )
-
-        if train is None:
-            return stacked_dataset(self, self._file, group)
-        return open_dataset(self, self._file, group, train)
-
-    def metrics(self, train: int | None = None) -> Metrics:
-        """Indices of the standards (docs/indices.md).
-
-        Args:
-            train: Index of one train; all if None.
-
-        Raises:
-            InputError: No such train, or the file lacks what the indices need.
-        """
-        from tiengine.indices.metrics import evaluate  # filters and vehicles: not for those who only read
-
-        return evaluate(self, train)
-
     def close(self) -> None:
         """Close the file; arrays taken from it stay."""
-        self._file.close()
+        self.file.close()
 
 
-def open(path: Path | str) -> Result:
-    """Open a result file.
+def open_reader(path: Path | str) -> Reader:
+    """Open a result file for reading; see :func:`open_file`."""
+    return Reader(open_file(path), str(path))
+
+
+def open_file(path: Path | str) -> h5py.File:
+    """Open the HDF5 file of a result and check its header.
 
     Args:
         path: The file.
 
     Returns:
-        The result; nothing but its header has been read.
+        The open file; nothing but its header has been read.
 
     Raises:
         InputError: There is no such file, it is not a result of this program, or its format is another one.
@@ -318,7 +270,7 @@ def open(path: Path | str) -> Result:
     except InputError:
         file.close()
         raise
-    return Result(file, str(path))
+    return file
 
 
 def _check_header(attributes: Any, path: Path | str) -> None:

@@ -28,9 +28,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
 
-import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.channels import Channel
 from tiengine.result_files.damage import unreadable
@@ -39,11 +39,9 @@ from tiengine.result_files.events import Event
 from tiengine.result_files.growing_dataset import Column
 from tiengine.result_files.layout import CHUNK, DTYPES, Axis, Block, GroupSpec, TrainLabels
 from tiengine.result_files.output_file import DISK_ERRORS, OutputFile, header
-from tiengine.result_files.reader import Result
+from tiengine.result_files.reader import Reader
 
 __all__ = ["Block", "GroupSpec", "TrainLabels", "Writer"]
-
-Reals = NDArray[np.float64]
 
 CHECKED = {"fletcher32": True}  # a checksum with every chunk: a damaged number is found out, not taken for one
 
@@ -253,7 +251,7 @@ class Writer:
         self._output.commit()
         self._samples_kept |= self._samples_written
 
-    def close(self, attributes: Mapping[str, Any]) -> Result:
+    def close(self, attributes: Mapping[str, Any]) -> Reader:
         """Complete the file.
 
         Args:

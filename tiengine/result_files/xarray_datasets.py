@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import h5py
     import xarray
 
-    from tiengine.result_files.reader import Result
+    from tiengine.result_files.reader import Reader
 
 __all__ = ["open_dataset", "stacked_dataset"]
 
@@ -20,7 +20,7 @@ ALONG_TRACK = ("time", "seat", "slab")
 """Dimensions of which trains may have done different stretches; what one of them has not is not a number."""
 
 
-def open_dataset(result: Result, file: h5py.File, group: str, train: int) -> xarray.Dataset:
+def open_dataset(result: Reader, file: h5py.File, group: str, train: int) -> xarray.Dataset:
     """One group of one train; a channel is read when its values are asked for, while the result is open.
 
     Args:
@@ -42,7 +42,7 @@ def open_dataset(result: Result, file: h5py.File, group: str, train: int) -> xar
     return dataset.assign_attrs(train=train, file=result.name, **facts)
 
 
-def stacked_dataset(result: Result, file: h5py.File, group: str) -> xarray.Dataset:
+def stacked_dataset(result: Reader, file: h5py.File, group: str) -> xarray.Dataset:
     """One group of all trains, read into memory, with the dimension ``train``.
 
     Trains that ran a shorter way are filled with "not a number". A train that failed before its first sample is left

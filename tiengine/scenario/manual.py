@@ -1,6 +1,7 @@
 """What the manual has from declarations: the page on the keys of a scenario, the tables of channels.
 
-``python -m tiengine.scenario.manual docs`` brings docs/scenario.md and docs/results.md up to date; a test holds them to it.
+``python -m tiengine.scenario.manual docs`` brings docs/scenario.md and docs/results.md up to date; a test holds them
+to it.
 """
 
 from __future__ import annotations

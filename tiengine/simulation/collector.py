@@ -13,7 +13,7 @@ from typing import Any
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path
 from tiengine.result_files.events import Event
-from tiengine.result_files.reader import COMPLETE, RUNNING, Result
+from tiengine.result_files.reader import COMPLETE, RUNNING, Reader
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, duration
 from tiengine.simulation.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
@@ -143,7 +143,7 @@ class Gathering:
         """Simulated time so far and in all [s], of all trains together."""
         return sum(self._simulated.values()), sum(self._whole)
 
-    def close(self, started: dict[str, float], workers: int) -> Result:
+    def close(self, started: dict[str, float], workers: int) -> Reader:
         """Complete the file.
 
         Args:

@@ -16,11 +16,11 @@ from tiengine.engine.time_step import AUTO_STEPS, prepare
 from tiengine.parameters.errors import InputError, RunFailedError, RunStoppedError
 from tiengine.recording.recorder import Recorder
 from tiengine.recording.trackside import trackside_groups
+from tiengine.result import Result
+from tiengine.result import open as open_result
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
 from tiengine.result_files.layout import GroupSpec
 from tiengine.result_files.output_file import check_output
-from tiengine.result_files.reader import Result
-from tiengine.result_files.reader import open as open_result
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.simulation import IMPORT_BEGAN
@@ -162,7 +162,7 @@ class _Job:
             done, whole = gathering.simulated
             raise RunStoppedError(f"stopped after {done:.3f} of {whole:.3f} s of simulated time")
         times = {"import": IMPORT_SECONDS, "total": time.perf_counter() - clock}
-        result = gathering.close(times, count if count > 1 else 0)
+        result = Result.of(gathering.close(times, count if count > 1 else 0))
         if len(gathering.failed) == everyone:
             result.close()
             raise RunFailedError("; ".join(f"train {train}: {why}" for train, why in sorted(gathering.failed.items())))

@@ -12,14 +12,12 @@ from collections.abc import Sequence
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 
 __all__ = ["SpeedProfile"]
-
-Reals = NDArray[np.float64]
 
 _LATTICE = 2**20  # positions per step of the lattice on which constant speed marches
 

@@ -43,11 +43,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from validation.closed_forms.timoshenko import Beam
 
 __all__ = ["Seats", "deflection_under_load", "free_rail", "jump", "load_transfer", "seat_force", "waves"]
 
-Reals = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 POINTS = 2**17  # of the inverse transform

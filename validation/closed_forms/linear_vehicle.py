@@ -24,15 +24,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
 from tiengine.contact.conicity import wheelset_position
 from tiengine.contact.table import ContactTable, WheelRailPair
+from tiengine.parameters.arrays import Reals
 from tiengine.vehicle.train import TrainModel
 
 __all__ = ["EquivalentContact", "critical_speed", "equivalent_contact", "fastest_growth"]
 
-Reals = NDArray[np.float64]
 PHASES = 64
 MASSLESS = 1e6  # 1/s: eigenvalues beyond belong to coordinates without mass
 

@@ -15,11 +15,11 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg
 import scipy.optimize
-from numpy.typing import NDArray
+
+from tiengine.parameters.arrays import Reals
 
 __all__ = ["leissa_parameters"]
 
-Reals = NDArray[np.float64]
 POINTS = 60  # Gauss points: the sixth function has four half waves, its products eight
 
 

@@ -11,12 +11,11 @@ under the load: to first order in c, with waves up to the mesh's shortest, q = p
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import kei
 
-__all__ = ["mesh_excess", "point_load_deflection"]
+from tiengine.parameters.arrays import Reals
 
-Reals = NDArray[np.float64]
+__all__ = ["mesh_excess", "point_load_deflection"]
 
 
 def point_load_deflection(load: float, rigidity: float, bed: float, r: Reals) -> Reals:

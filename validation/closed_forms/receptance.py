@@ -20,12 +20,12 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from validation.closed_forms.floquet import Seats
 from validation.closed_forms.timoshenko import Beam
 
 __all__ = ["receptance"]
 
-Reals = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 

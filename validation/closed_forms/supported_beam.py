@@ -25,14 +25,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from tiengine.parameters.arrays import Reals
 from validation.closed_forms.timoshenko import Beam, pinned_frequencies
 
 __all__ = ["Crossing", "force_euler", "force_timoshenko", "moving_mass", "sprung_mass"]
 
-Reals = NDArray[np.float64]
 GRAVITY = 9.81  # m/s^2
 RTOL = 1e-7  # of the integration, a hundred times finer than what it judges
 

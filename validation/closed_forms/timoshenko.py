@@ -8,11 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tiengine.parameters.arrays import Reals
 
 __all__ = ["Beam", "moving_load_deflection", "pinned_frequencies", "static_missing_share"]
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

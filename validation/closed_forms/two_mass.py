@@ -25,9 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["WheelOnTrack", "beam_receptance", "force_per_roughness", "peak", "two_mass_frequencies"]
+from tiengine.parameters.arrays import Reals
 
-Reals = NDArray[np.float64]
+__all__ = ["WheelOnTrack", "beam_receptance", "force_per_roughness", "peak", "two_mass_frequencies"]
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,10 @@ from w, w', w'' continuous and EI w''' jumping by P. Signs: w and P down, s ahea
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tiengine.parameters.arrays import Reals
 
 __all__ = ["critical_speed", "damped_deflection", "undamped_deflection"]
-
-Reals = NDArray[np.float64]
 
 
 def critical_speed(EI: float, m: float, k: float) -> float:

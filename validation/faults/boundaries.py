@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from tiengine import result as results
 from tiengine.parameters.errors import InputError
-from tiengine.result_files import reader as results
 from tiengine.result_files.channels import DOFS
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
 from tiengine.result_files.events import Event
@@ -161,7 +161,7 @@ def _try(
     for n in range(0, len(calls), stride):
         for torn in (False, True) if calls[n].startswith("write") else (False,):
             here = shutil.copytree(template, folder / "here")
-            in_copy(lambda: session(here), at_call(n), torn)
+            in_copy(lambda: session(here), at_call(n), torn)  # noqa: B023
             done = sum(end <= n for end, _ in states) - 1
             allowed = [states[k][1] for k in (done, done + 1) if k < len(states)]
             found.deaths += 1
@@ -267,7 +267,7 @@ def _die_completing(folder: Path, allowed: list[Any], where: str, found: Boundar
     n = 0
     while True:
         again = shutil.copytree(folder, folder.with_name("again"))
-        status = in_copy(lambda: results.open(again / NAME).close(), at_call(n))
+        status = in_copy(lambda: results.open(again / NAME).close(), at_call(n))  # noqa: B023
         found.twice += status == DIED
         results.open(again / NAME).close()
         if _state(again) not in allowed:

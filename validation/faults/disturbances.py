@@ -9,8 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from tiengine import result as results
 from tiengine.parameters.errors import InputError
-from tiengine.result_files import reader as results
 from validation.faults.contents import contents, reads, start_of
 from validation.faults.kills import NAME, Yard
 from validation.faults.launch import Process
@@ -111,7 +111,7 @@ def _read_meanwhile(yard: Yard) -> Check:
         plain[reads(folder / NAME, lambda left: not start_of(left, yard.reference))] += 1
         try:
             with results.open(folder / NAME) as result:
-                result.finished
+                result.finished  # noqa: B018
             opened += 1
         except InputError as error:
             bad.append(f"tiengine.open: {error}")

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 
+from tiengine import result as results
 from tiengine.parameters.errors import InputError
-from tiengine.result_files import reader as results
 from tiengine.result_files.journal import journal_of
 from validation.faults.contents import Contents, contents, differing, holds, litter, reads, start_of
 from validation.faults.launch import Process, command, copied, keep_shapes

@@ -180,7 +180,8 @@ def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str]) -> in
 
 
 class _Copies:
-    """In place of ``multiprocessing`` in :mod:`tiengine.simulation.worker`: workers are copies that own nothing but their pipe."""
+    """In place of ``multiprocessing`` in :mod:`tiengine.simulation.worker`: workers are copies that own
+    nothing but their pipe."""
 
     def __init__(self) -> None:
         self._fork = multiprocessing.get_context("fork")

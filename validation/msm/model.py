@@ -26,6 +26,7 @@ from tiengine.irregularity.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
 from tiengine.model.model import CONTACT_TOLERANCE, Ingredients
 from tiengine.model.newmark import Newmark
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.fastening import Fastening
@@ -36,8 +37,6 @@ from validation.msm.plate import ModalSlab, modal_slab
 from validation.msm.seats import SeatTransform
 
 __all__ = ["FullTrack", "SlabGroup", "build_track", "whole_seats"]
-
-Reals = NDArray[np.float64]
 
 (WW, W_THETA, THETA_Y, VV, V_THETA, THETA_Z, TORSION) = range(7)
 """Rows of the rails' modal stiffness; the first six also of K in the vertical and the lateral plane."""

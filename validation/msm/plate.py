@@ -19,12 +19,11 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from tiengine.parameters.arrays import Reals
 from tiengine.track.mortar import Mortar, MortarVoid
 from tiengine.track.slab import Slab
 
 __all__ = ["ModalSlab", "modal_slab"]
-
-Reals = NDArray[np.float64]
 
 POWERS = np.array([(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (3, 1), (1, 3)])
 GAUSS = 4  # points a direction: products of two cubics need no more

@@ -14,9 +14,9 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-__all__ = ["SeatTransform"]
+from tiengine.parameters.arrays import Reals
 
-Reals = NDArray[np.float64]
+__all__ = ["SeatTransform"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine.engine import backend
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.model.from_scenario import ingredients
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.recording.recorder import Recorder, Samples
-from tiengine.result_files.reader import Result
+from tiengine.result import Result
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.simulation.simulate import Progress
@@ -25,8 +25,6 @@ from validation.msm.start import steady_rolling
 from validation.msm.step import Buffers, FullState, FullStepper
 
 __all__ = ["FullLength", "load", "prepare", "run_full_length"]
-
-Reals = NDArray[np.float64]
 
 CHUNK_STEPS = 1000
 END_MARGIN = 10.0

@@ -14,19 +14,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.state import State
 from tiengine.kernels import layout as at
 from tiengine.model.model import Ingredients, build_model
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import Scenario
 from validation.msm.model import FullTrack
 from validation.msm.step import FullState
 
 __all__ = ["steady_rolling"]
-
-Reals = NDArray[np.float64]
 
 MARGIN = 20.0
 """Window beyond the outer wheels for the start [m]: exp(-20 m / 1 m) of the deflection is left at its ends."""

@@ -13,18 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from tiengine.engine.launch import Launch
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import COS, N_CONTACT
 from tiengine.model.newmark import inverse
+from tiengine.parameters.arrays import Reals
 from validation.msm import kernels
 from validation.msm.model import CL, CV, KL, KV, FullTrack
 
 __all__ = ["Buffers", "FullState", "FullStepper"]
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(eq=False)

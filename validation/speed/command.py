@@ -10,8 +10,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from tiengine import result as results
 from tiengine.contact import table_cache as contact_cache
-from tiengine.result_files import reader as results
 from validation.speed.effort import Effort
 from validation.speed.findings import Findings
 from validation.speed.runs import CASES, Facts, median_of
