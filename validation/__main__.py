@@ -11,8 +11,8 @@ from rich.progress import Progress
 
 from tiengine.engine import backend
 from tiengine.scenario.scenario import load_scenario
-from validation.case import Outcome, evaluate
-from validation.table import headlines, insert, keep, markdown, show
+from validation.frame.case import Outcome, evaluate
+from validation.frame.table import headlines, insert, keep, markdown, show
 
 ROOT = Path(__file__).resolve().parents[1]
 REPORT = ROOT / "validation" / "report" / "verification.md"
@@ -27,7 +27,7 @@ def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool
     """Hold the engine to closed forms, others' numbers and its own convergence; status 1 on a miss."""
     if context.invoked_subcommand is not None:
         return
-    from validation.catalogue import CASES, HEADLINES
+    from validation.frame.catalogue import CASES, HEADLINES
 
     chosen = [case for case in CASES if (case.quick or not quick) and (not only or case.name.startswith(only))]
     if not chosen:
@@ -52,7 +52,7 @@ def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool
 @main.command()
 def figures() -> None:
     """Draw the report's smaller figures: conicity, periodic supports, spectrum of the wheel force."""
-    from validation import contact_geometry, periodic_support_figure, wheel_spectrum
+    from validation.cases import contact_geometry, periodic_support_figure, wheel_spectrum
 
     backend.start()
     for name, module in (
@@ -67,7 +67,7 @@ def figures() -> None:
 @main.command()
 def convergence() -> None:
     """Refine step, modes, slab mesh and window; table and figures go to validation/report (7 min)."""
-    from validation.convergence_report import write
+    from validation.convergence.report import write
 
     backend.start()
     write(REPORT.parent)
@@ -76,7 +76,7 @@ def convergence() -> None:
 @main.command()
 def paper() -> None:
     """Compare window and full length on the paper's case; tables and figures go to validation/report (half an hour)."""
-    from validation.paper_report import write
+    from validation.paper.report import write
 
     page = write(REPORT.parent)
     click.echo(f"wrote {page}")

@@ -14,7 +14,7 @@ from tiengine.model.model import Model
 from tiengine.parameters.arrays import Reals
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
-from tiengine.track.plate_shapes import moment_operator
+from tiengine.track.slab_moments import moment_operator
 
 __all__ = ["SlabEnvelopes", "SlotExtremes"]
 

@@ -1,7 +1,7 @@
 """What ``tiengine contact`` shows of a wheel on a rail: rolling-radius difference, conicity, points of contact.
 
-The wheelset is shifted sideways on straight track, its roll follows (:mod:`tiengine.contact.conicity`). Conicity is that
-of harmonic linearisation; what EN 15302 gets by integrating the motion is compared in ``docs/files.md``.
+The wheelset is shifted sideways on straight track, its roll follows (:mod:`tiengine.contact.conicity`). Conicity is
+that of harmonic linearisation; what EN 15302 gets by integrating the motion is compared in ``docs/files.md``.
 """
 
 from __future__ import annotations

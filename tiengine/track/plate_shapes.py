@@ -5,31 +5,13 @@ Places are measured from the slab's centre, x forward, y to the right. DOFs as i
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.kernels import plate
 from tiengine.track.slab import Slab
 
-if TYPE_CHECKING:
-    from tiengine.track.slab import Slab
-
-__all__ = [
-    "GAUSS_POINTS",
-    "WX",
-    "WXX",
-    "WXY",
-    "WY",
-    "WYY",
-    "W",
-    "element_dofs",
-    "locate",
-    "moment_operator",
-    "shapes_at",
-    "tabulate_shapes",
-]
+__all__ = ["WX", "WXX", "WXY", "WY", "WYY", "W", "element_dofs", "locate", "shapes_at", "tabulate_shapes"]
 
 W, WX, WY, WXX, WYY, WXY = range(6)
 """Rows of a table of shapes: deflection and its derivatives by x and y."""
@@ -85,26 +67,3 @@ def shapes_at(
     ey, eta = locate(y, slab.width, slab.elements_y)
     index: NDArray[np.int32] = element_dofs(slab)[ex * slab.elements_y + ey]
     return index, tabulate_shapes(slab, np.stack([xi, eta], axis=1))
-
-
-GAUSS_POINTS = np.array([[x, y] for x in (-1.0, 1.0) for y in (-1.0, 1.0)]) / np.sqrt(3.0)
-"""Local coordinates of an element's points, shape (4, 2)."""
-
-
-def moment_operator(slab: Slab, points: NDArray[np.float64] = GAUSS_POINTS) -> NDArray[np.float64]:
-    """Slab coordinates to bending moments.
-
-    Args:
-        slab: The slab.
-        points: Local coordinates -1...1 in each element, shape (points, 2).
-
-    Returns:
-        M_x and M_y at the points of all elements [N m/m per m, or per rad], shape (dofs, 2, elements * points).
-    """
-    table, index = tabulate_shapes(slab, points), element_dofs(slab)
-    along, across = -slab.rigidity * table[:, WXX], -slab.rigidity * table[:, WYY]
-    moments = np.stack([along + slab.nu * across, across + slab.nu * along])
-    operator = np.zeros((slab.plate_dofs + 2, 2, len(index), len(points)))
-    for element, dofs in enumerate(index):
-        operator[dofs, :, element] = moments.transpose(2, 0, 1)
-    return operator.reshape(len(operator), 2, -1)

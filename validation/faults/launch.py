@@ -180,8 +180,7 @@ def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str]) -> in
 
 
 class _Copies:
-    """In place of ``multiprocessing`` in :mod:`tiengine.simulation.worker`: workers are copies that own
-    nothing but their pipe."""
+    """Stands in for ``multiprocessing`` in :mod:`tiengine.simulation.worker`: workers own nothing but a pipe."""
 
     def __init__(self) -> None:
         self._fork = multiprocessing.get_context("fork")

@@ -1,0 +1,156 @@
+"""Envelopes: what is kept of every step against the state itself, step by step."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tiengine.engine.stepper import Stepper
+from tiengine.kernels import layout as at
+from tiengine.recording.seat_envelopes import SeatEnvelopes, watched_seats
+from tiengine.recording.slab_envelopes import SlabEnvelopes
+from tiengine.scenario.scenario import load_scenario
+from tiengine.track.slab_moments import moment_operator
+
+from ..models import V350, Run, paper_model
+
+DT = 2e-4
+
+
+@pytest.mark.parametrize("zone", [0.0, 6.0])
+def test_envelopes_are_the_extremes_of_every_step(zone):
+    """Kept as the window goes 20 m, against the largest and smallest of all forces of each seat outside the zones."""
+    run = Run(paper_model(absorbing_zone=zone, dt=DT), V350, steps=1050)
+    stepper, state = run.stepper, run.state
+    envelopes = SeatEnvelopes.of(stepper)
+    seen: dict[int, list[NDArray[np.float64]]] = defaultdict(list)
+    first, end = watched_seats(run.model)
+    length, d = run.model.given.length, run.model.given.slab.fastening_pitch
+
+    def look() -> None:
+        s = stepper.chunk.clock[stepper.asked[0], at.FIRST_SEAT_S] + np.arange(state.seat_force.shape[-1]) * d
+        assert zone <= s[first] < zone + 2.0 * d
+        assert length - zone - 2.0 * d < s[end - 1] <= length - zone
+        for place in range(first, end):
+            seen[state.first_seat + place].append(state.seat_force[0, :, :2, place].copy())
+
+    stepper.stages = (*stepper.stages, ("envelopes", envelopes.watch), ("look", look))
+    run.march(1050)
+    none = np.zeros(0)
+    passed, rest = envelopes.blocks(none, none)[0], envelopes.rest()[0]
+    assert len(passed.along) == state.first_seat > 25
+    np.testing.assert_array_equal(np.concatenate([passed.along, rest.along]), sorted(seen))
+    np.testing.assert_allclose(np.concatenate([passed.place, rest.place]), (np.array(sorted(seen)) + 0.5) * d)
+    for extreme, reduce in (("largest", np.max), ("smallest", np.min)):
+        for row, kind in enumerate(("vertical", "lateral")):
+            name = f"{extreme}_{kind}_force"
+            expected = [reduce([force[:, row] for force in seen[seat]], axis=0) for seat in sorted(seen)]
+            np.testing.assert_array_equal(np.concatenate([passed.channels[name], rest.channels[name]]), expected)
+
+
+def test_after_one_step_the_seats_carry_the_train():
+    """Largest and smallest are the force itself; their sum is the weight but for what the window's ends carry, 1e-4.
+
+    Ten decay lengths of 0.8 m from the outer wheels to the ends leave exp(-10) = 5e-5
+    (tests/simulation/test_simulate.py).
+    """
+    run = Run(paper_model(dt=DT), V350, steps=1)
+    envelopes = SeatEnvelopes.of(run.stepper)
+    run.stepper.stages = (*run.stepper.stages, ("envelopes", envelopes.watch))
+    run.march(1)
+    channels = envelopes.rest()[0].channels
+    train = run.model.given.train
+    weight = train.gravity[1 : train.n_dof : 5].sum()
+    np.testing.assert_array_equal(channels["largest_vertical_force"], channels["smallest_vertical_force"])
+    assert channels["largest_vertical_force"].sum() == pytest.approx(weight, rel=1e-4)
+    spin = np.abs(channels["largest_lateral_force"].sum(axis=0))  # spin creep pushes both rails, outward or inward
+    assert channels["largest_lateral_force"].sum() == pytest.approx(0.0, abs=1e-3 * spin.max())
+    assert spin.min() > 100.0
+
+
+@pytest.mark.parametrize("mortar", ["implicit", "explicit"])
+def test_slabs_against_their_coordinates(mortar):
+    """Deflection at nodes and seats, moments and pressures of every sample of the bodies."""
+    run = Run(paper_model(f'numerics.mortar="{mortar}"', dt=DT), V350, steps=500)
+    scenario = load_scenario("paper")
+    stepper, slab = run.stepper, run.model.given.slab
+    envelopes = SlabEnvelopes.of(scenario, stepper)
+    operator, slots, sound = moment_operator(slab), run.model.given.slots, run.model.given.designs.matrices[0]
+    seen: dict[int, list[tuple[float, ...]]] = defaultdict(list)
+    held: list[int] = []
+
+    def look() -> None:
+        held.append(run.state.first_slab)
+        for number in range(held[-1], held[-1] + slots):
+            u = run.state.view(at.U, "slabs")[0, number % slots]
+            moments = np.tensordot(u, operator, 1)
+            under_seats = [
+                shape @ u[index]
+                for index, shape in zip(sound.seat_index.reshape(-1, 12), sound.seat_w.reshape(-1, 12), strict=True)
+            ]
+            w = np.append(u[: slab.plate_dofs : 3], under_seats)
+            seen[number].append((w.max(), *moments.max(axis=1), w.min(), *moments.min(axis=1)))
+
+    stepper.stages = (*stepper.stages, ("envelopes", envelopes.watch), ("look", look))
+    run.march(500)
+    stepper.fill_pressures(500)
+    none = np.zeros(0)
+    passed, rest = envelopes.blocks(none, none)[0], envelopes.rest()[0]
+    assert len(passed.along) == run.state.first_slab > 0
+    numbers = np.concatenate([passed.along, rest.along])
+    found = {name: np.concatenate([passed.channels[name], rest.channels[name]]) for name in passed.channels}
+    np.testing.assert_array_equal(numbers, sorted(seen))
+    for i, name in enumerate(("deflection", "moment_x", "moment_y")):
+        expected = [(max(row[i] for row in seen[k]), min(row[3 + i] for row in seen[k])) for k in sorted(seen)]
+        scale = np.abs(expected).max()
+        for extreme, values in zip(("largest", "smallest"), np.transpose(expected), strict=True):
+            # the same sums of 12 products in another order: rounding
+            np.testing.assert_allclose(found[f"{extreme}_{name}"], values, atol=1e-13 * scale)
+    pressure = run.chunk.mortar[0]
+    for i, number in enumerate(numbers):
+        rows = [k for k, first in enumerate(held) if first <= number < first + slots]
+        slot = pressure[rows, number % slots]
+        assert (found["largest_pressure"][i], found["smallest_pressure"][i]) == (slot[:, 0].max(), slot[:, 1].min())
+    np.testing.assert_array_equal(found["mortar_factor"], 1.0)
+
+
+def test_what_is_kept_can_be_saved_and_restored():
+    """A march that is left in the middle and taken up by another stepper ends with the same envelopes."""
+    none = np.zeros(0)
+
+    def watched(run: Run) -> list[Any]:
+        watchers = [SeatEnvelopes.of(run.stepper), SlabEnvelopes.of(load_scenario("paper"), run.stepper)]
+        run.stepper.stages = (*run.stepper.stages, *(("envelopes", each.watch) for each in watchers))
+        return watchers
+
+    def give_out(run: Run, watchers: list[Any]) -> list[Any]:
+        run.stepper.fill_pressures(150)
+        return [each.blocks(none, none)[0] for each in watchers]
+
+    model = paper_model(dt=DT)
+    whole = Run(model, V350, steps=150)
+    kept = watched(whole)
+    whole.march(150)
+    give_out(whole, kept)
+    saved, state = [deepcopy(each.saved()) for each in kept], deepcopy(whole.state)
+    whole.march(150)
+    expected = give_out(whole, kept) + [each.rest()[0] for each in kept]
+
+    half = Run(model, V350, X=whole.X - 150 * V350 * DT, steps=150, start=False)
+    half.state = state
+    half.stepper = Stepper(model, state, half.chunk)
+    others = watched(half)
+    for each, values in zip(others, saved, strict=True):
+        each.restore(values)
+    half.march(150)
+    found = give_out(half, others) + [each.rest()[0] for each in others]
+    assert sum(len(block.along) for block in found) > 60
+    for mine, theirs in zip(expected, found, strict=True):
+        np.testing.assert_array_equal(mine.along, theirs.along)
+        for name, values in mine.channels.items():
+            np.testing.assert_array_equal(values, theirs.channels[name])

@@ -1,0 +1,1 @@
+"""Convergence study of the engine's settings."""

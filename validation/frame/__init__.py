@@ -1,0 +1,1 @@
+"""Frame of the validation: a case, the table, the catalogue, shared runs."""

@@ -1,0 +1,88 @@
+"""All cases, in the order of the table."""
+
+from __future__ import annotations
+
+from validation.cases import (
+    bdf,
+    contact_geometry,
+    contact_kinematics,
+    critical_speed,
+    hertz_kalker,
+    irregularity,
+    klingel,
+    manchester,
+    moving_load,
+    periodic_support,
+    plates,
+    rail,
+    receptance,
+    robustness,
+    smooth_track,
+    statistics,
+    supported_beam,
+    thin_plates,
+    time_stepping,
+    vehicles,
+    wheel_spectrum,
+    window,
+    winkler_load,
+)
+from validation.convergence import study as convergence
+from validation.frame.case import Case
+from validation.paper import case as paper_case
+from validation.paper import comparison
+
+__all__ = ["CASES", "HEADLINES"]
+
+_FILES = (
+    plates,
+    thin_plates,
+    rail,
+    moving_load,
+    winkler_load,
+    supported_beam,
+    periodic_support,
+    receptance,
+    vehicles,
+    klingel,
+    critical_speed,
+    hertz_kalker,
+    contact_geometry,
+    contact_kinematics,
+    manchester,
+    irregularity,
+    smooth_track,
+    statistics,
+    wheel_spectrum,
+    time_stepping,
+    convergence,
+    bdf,
+    robustness,
+    paper_case,
+    comparison,
+    window,
+)
+
+CASES: tuple[Case, ...] = tuple(case for file in _FILES for case in file.CASES)
+"""Every case of every file."""
+
+HEADLINES = (
+    "plate-aspect-1.5",
+    "floquet-seat-350",
+    "floquet-deflection-350",
+    "pinned-pinned",
+    "supported-beam-mass",
+    "klingel-free-20",
+    "vehicle-CRH380A_v2",
+    "hertz-cone-R300",
+    "manchester-station",
+    "conicity-EN-15302",
+    "spectrum-P2-long",
+    "bdf-5e-05",
+    "equal-density-36-vertical",
+    "equal-density-36-lateral",
+    "equal-density-60-lateral",
+    "ripple",
+    "defects-seats",
+)
+"""The few cases that the README shows."""

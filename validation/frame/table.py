@@ -1,0 +1,129 @@
+"""The table of outcomes: on the screen, and as Markdown for README and report."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from validation.frame.case import Case, Outcome
+
+__all__ = ["COLUMNS", "headlines", "insert", "keep", "markdown", "show"]
+
+COLUMNS = ("case", "quantity", "reference", "ours", "deviation", "tolerance", "source", "verdict")
+TEXTS = ("verdict", "reference", "ours", "deviation", "tolerance", "seconds")
+"""Of an outcome, what is kept from one run to the next."""
+BEGIN, END = "<!-- verification -->", "<!-- /verification -->"
+TITLES = {
+    "verification": "Against closed forms",
+    "validation": "Against other people's numbers",
+    "full length": "Against the traditional full-length model",
+    "convergence": "Against ourselves, finer",
+    "information": "For information",
+}
+_COLOURS = {"ok": "green", "MISS": "bold red", "for information": "dim", "left out": "yellow"}
+
+
+def _row(outcome: Outcome) -> tuple[str, ...]:
+    """Texts in the order of :data:`COLUMNS`."""
+    case = outcome.case
+    tolerance = f"{outcome.tolerance}: {case.why}" if outcome.tolerance else case.why
+    return (
+        case.name,
+        case.quantity,
+        outcome.reference,
+        outcome.ours,
+        outcome.deviation,
+        tolerance,
+        case.source,
+        outcome.verdict,
+    )
+
+
+def show(outcomes: Sequence[Outcome], console: Console) -> None:
+    """Print a table for each kind of case."""
+    for kind, title in TITLES.items():
+        chosen = [outcome for outcome in outcomes if outcome.case.kind == kind]
+        if not chosen:
+            continue
+        table = Table(title=title, title_justify="left", show_lines=True)
+        for column in COLUMNS:
+            table.add_column(column, overflow="fold")
+        for outcome in chosen:
+            *texts, verdict = _row(outcome)
+            table.add_row(*map(escape, texts), f"[{_COLOURS[verdict]}]{verdict}[/]")
+        console.print(table)
+
+
+def markdown(outcomes: Sequence[Outcome]) -> str:
+    """The same as Markdown, headed by what it was computed with."""
+    versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("tiengine", "taichi", "numpy", "scipy"))
+    lines = [
+        f"{_score(outcomes)} Python {platform.python_version()}, {versions}.",
+        "Where a case has many numbers, the one that uses most of its tolerance is shown.",
+    ]
+    for kind, title in TITLES.items():
+        chosen = [outcome for outcome in outcomes if outcome.case.kind == kind]
+        if chosen:
+            lines += ["", f"**{title}**", "", _line(COLUMNS), _line(["---"] * len(COLUMNS))]
+            lines += [_line(_row(outcome)) for outcome in chosen]
+    return "\n".join(lines) + "\n"
+
+
+def headlines(outcomes: Sequence[Outcome], names: Sequence[str]) -> str:
+    """The README's share: how many cases are met, and the few that say most."""
+    columns = ("quantity", "reference", "ours", "tolerance", "source")
+    lines = [f"{_score(outcomes)} All of them: [table](validation/report/verification.md).", ""]
+    lines += [_line(columns), _line(["---"] * len(columns))]
+    for outcome in outcomes:
+        if outcome.case.name in names:
+            cells = (outcome.case.quantity, outcome.reference, outcome.ours, outcome.tolerance, outcome.case.source)
+            lines.append(_line(cells))
+    return "\n".join(lines) + "\n"
+
+
+def _score(outcomes: Sequence[Outcome]) -> str:
+    judged = [outcome for outcome in outcomes if outcome.verdict in ("ok", "MISS")]
+    missed = [outcome.case.name for outcome in judged if outcome.verdict == "MISS"]
+    return f"`python -m validation`: {len(judged) - len(missed)} of {len(judged)} cases met" + (
+        f"; missed: {', '.join(missed)}." if missed else "."
+    )
+
+
+def keep(outcomes: Sequence[Outcome], file: Path, cases: Sequence[Case]) -> list[Outcome]:
+    """Add outcomes to those of earlier runs, so that a few cases can be computed anew without all the others.
+
+    Args:
+        outcomes: New ones.
+        file: JSON with the texts of each case, rewritten.
+        cases: All cases; what belongs to none of them any more is dropped.
+
+    Returns:
+        Everything known, in the order of the cases.
+    """
+    known = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    for outcome in outcomes:
+        known[outcome.case.name] = {name: getattr(outcome, name) for name in TEXTS}
+    known = {case.name: known[case.name] for case in cases if case.name in known}
+    file.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+    return [Outcome(case, **known[case.name]) for case in cases if case.name in known]
+
+
+def insert(text: str, file: Path) -> None:
+    """Put a text between the markers of a Markdown file; markers are added at its end if it has none."""
+    old = file.read_text(encoding="utf-8") if file.exists() else ""
+    if BEGIN not in old or END not in old:
+        old = f"{old.rstrip()}\n\n{BEGIN}\n{END}\n".lstrip()
+    before, rest = old.split(BEGIN, 1)
+    after = rest.split(END, 1)[1]
+    file.write_text(f"{before}{BEGIN}\n{text}{END}{after}", encoding="utf-8")
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

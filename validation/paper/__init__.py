@@ -1,0 +1,1 @@
+"""The paper's case: moving window beside the traditional full-length model."""
