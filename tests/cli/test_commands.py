@@ -215,7 +215,7 @@ def test_version():
 def test_light_commands_do_not_import_taichi():
     """Listing and reading answer at once; Taichi alone takes longer to import than they take."""
     code = (
-        "import sys, tiengine.results\nfrom click.testing import CliRunner\nfrom tiengine.cli import main\n"
+        "import sys, tiengine.result\nfrom click.testing import CliRunner\nfrom tiengine.cli.commands import main\n"
         "assert CliRunner().invoke(main, ['list']).exit_code == 0\n"
         "sys.exit('taichi' in sys.modules)"
     )
