@@ -13,7 +13,7 @@ from tiengine.irregularity.irregularity import IrregularityParams, make_irregula
 from tiengine.irregularity.measured_files import LARGEST_CHAINAGE, LARGEST_HEIGHT, read_series
 
 from ..fuzzing import DAMAGES, EXAMPLES, Damage, mutated_texts, on_many, refused
-from ..test_profile_files import columns, miniprof, simpack
+from ..contact.test_profile_files import columns, miniprof, simpack
 
 KINDS: dict[Kind, str] = {"wheel": "LMA", "rail": "CHN60"}
 WRITERS = {".prw": simpack, ".prr": simpack, ".whl": miniprof, ".ban": miniprof, ".csv": columns}
