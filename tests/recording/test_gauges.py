@@ -24,7 +24,7 @@ SEAT = {"name": "c", "on": "fastening", "chainage": 20.0, "side": "right"}
 @pytest.mark.parametrize(
     ("gauges", "message"),
     [
-        ([RAIL, RAIL | {"side": "right"}], r"gauges\[1\].name = 'a': gauges\[0\] has this name already"),
+        ([RAIL, RAIL | {"side": "right"}], r"gauges\[1\].name = 'a': gauges\[0\] already has this name"),
         ([RAIL | {"name": "a b"}], r"gauges\[0\].name = 'a b': must be made of letters, digits, _ and -"),
         ([RAIL | {"name": ""}], r"gauges\[0\].name = '': must be made of"),
         ([RAIL | {"name": "../x"}], r"gauges\[0\].name = '../x': must be made of"),

@@ -206,7 +206,7 @@ BAD = {
     # between keys
     "numerics.window=20": "numerics.window = 20: window shorter than the train; must be at least 24 m",
     "numerics.absorbing_zone=7": "numerics.absorbing_zone = 7: must be at most 6 m in this window",
-    "train.coupler_pitch=[20.0]": "train.coupler_pitch = [20.0]: must be one number or 0, one a coupling",
+    "train.coupler_pitch=[20.0]": "train.coupler_pitch = [20.0]: must be one number or 0, one per coupling",
     "irregularity.spectrum=german_lo": "irregularity.spectrum = 'german_lo': unknown; did you mean",
     "irregularity.wavelength_max=0.5": "irregularity.wavelength_m",
     "track.failed_fastenings=[{seats=[3, 2]}]": "seats = [3, 2]: must be [first, last] with first <= last",
@@ -258,7 +258,7 @@ def test_bad_files(tmp_path: Path):
 def test_preset_like_itself_is_refused():
     """A circle of presets ends in a message, not in recursion."""
     presets = {"rails": {"a": {"like": "b"}, "b": {"like": "a"}}}
-    assert "is like itself" in refusal({"train": TRAIN, "track": {"rail": "a"}, "presets": presets})
+    assert "is defined in terms of itself" in refusal({"train": TRAIN, "track": {"rail": "a"}, "presets": presets})
 
 
 def test_wavelength_limit_is_eight_steps():

@@ -130,7 +130,7 @@ def test_measured_files_are_found_beside_the_scenario(tmp_path):
         ({"size": 2, "vary": {"output.precision": ["single", "double"]}}, "'output.precision' cannot vary"),
         ({"size": 2, "vary": {"ensemble.size": [1, 2]}}, "'ensemble.size' cannot vary"),
         ({"size": 2, "vary": {"numerics.threads": [1, 2]}}, "'numerics.threads' cannot vary"),
-        ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.seed": [1, 2]}}, "'irregularity.seed' cannot vary where"),
+        ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.seed": [1, 2]}}, "'irregularity.seed' cannot vary if"),
         ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.spectrum": ["none"]}}, "ensemble.seeds: make no differ"),
     ],
 )

@@ -46,8 +46,8 @@ class Profile:
         y: Lateral positions, outward positive, strictly increasing [m], shape (n,).
         z: Heights, down positive [m], shape (n,).
         has_cant: The points are those of a rail already inclined in the track.
-        smoothing: Length l of the smoothing spline [m], 0 for interpolation; some 0.5e-3 for a measured
-            profile.
+        smoothing: Length l of the smoothing spline [m], 0 for interpolation; about 0.5e-3 for a
+            measured profile.
 
     Raises:
         InputError: Fewer than 10 points, a value that is not finite, or y that does not increase.
@@ -122,16 +122,16 @@ class Profile:
         return self.path(inside) + slope * (t - inside)[:, None], slope
 
     def canted(self, cant: float) -> Profile:
-        """The rail as it stands in the track, its head leaning inward.
+        """Rail inclined inward by the cant, as installed in the track.
 
         The origin is the crown, the point of the head whose tangent is inclined by the cant: for a rail drawn
-        upright it is the origin of the drawing. A rail whose points are inclined already is only moved there.
+        upright it is the origin of the drawing. A rail whose points are inclined already is only shifted.
 
         Args:
             cant: Inclination, 0.025 for 1:40.
 
         Returns:
-            The inclined profile, cut where the side would overhang.
+            The inclined profile, cut where its side would overhang.
         """
         if self.has_cant:
             crown = self._crown(cant)
@@ -143,7 +143,7 @@ class Profile:
         return replace(self, y=y[first:last], z=z[first:last], has_cant=True)
 
     def _crown(self, cant: float) -> float:
-        """Where the head's tangent falls inward by ``cant`` [m]."""
+        """The y where the head's tangent falls inward by ``cant`` [m]."""
         top = float(self.y[np.argmin(self.z)])
         try:
             return float(brentq(lambda y: float(self.height(y, 1)) + cant, top - 25e-3, top + 1e-3, xtol=1e-12))
@@ -186,14 +186,14 @@ def load_profile(
     mirror: bool | None = None,
     tape_circle: float = 0.0,
 ) -> Profile:
-    """A profile of the library, or one read from a file (formats: :mod:`tiengine.contact.profile_files`).
+    """Load a profile of the library or of a file (formats: :mod:`tiengine.contact.profile_files`).
 
     Args:
         name_or_path: Name of a preset (``"LMA"``, ``"S1002"``, ``"CHN60"``, ``"60E1"``) or path of a file.
         kind: ``"wheel"`` or ``"rail"``.
         has_cant: The points are those of an inclined rail.
         smoothing: Length of the smoothing spline [m].
-        mirror: A rail's gauge face is at the file's positive y; None if nothing is known.
+        mirror: Whether a rail's gauge face is at the file's positive y; None if not stated.
         tape_circle: Distance of a wheel's tape circle outward from the file's y = 0 [m].
 
     Returns:

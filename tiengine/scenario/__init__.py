@@ -1,1 +1,1 @@
-"""Scenarios: everything that a user can state about a run, checked."""
+"""Scenarios: validated description of a run."""
