@@ -9,10 +9,11 @@ import pytest
 import scipy.linalg
 from numpy.typing import NDArray
 
+from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import build
 from tiengine.track.mortar import Mortar, MortarVoid
-from tiengine.track.slab import GRAVITY, Slab, load_slab, slab_names
+from tiengine.track.slab import Slab, load_slab, slab_names
 from tiengine.track.slab_matrices import SlabMatrices, slab_designs, slab_matrices
 from validation.closed_forms.plate_ritz import frequencies
 

@@ -14,10 +14,8 @@ mm arc joint by 0.03 um.
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +25,9 @@ from scipy.optimize import brentq
 from tiengine.contact.profile_files import read_profile
 from tiengine.contact.profile_frame import FEWEST_POINTS, Kind, increasing_run, placed, smoothing_curve
 from tiengine.parameters.arrays import Reals
-from tiengine.parameters.errors import InputError
+from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.input_files import is_file
+from tiengine.parameters.presets import find_preset, preset_names
 
 __all__ = ["Kind", "Profile", "load_profile", "profile_names"]
 
@@ -173,8 +172,7 @@ class Profile:
 
 def profile_names() -> list[str]:
     """Names of the profiles of the library."""
-    folder = resources.files("tiengine.library") / "profiles"
-    return sorted(entry.name.removesuffix(".csv") for entry in folder.iterdir() if entry.name.endswith(".csv"))
+    return preset_names("profiles")
 
 
 def load_profile(
@@ -205,13 +203,11 @@ def load_profile(
     """
     name = str(name_or_path)
     if name in profile_names():
-        path = Path(str(resources.files("tiengine.library") / "profiles" / f"{name}.csv"))
+        path = find_preset("profiles", name)
     elif is_file(Path(name)):
         path = Path(name)
     else:
-        close = difflib.get_close_matches(name, profile_names(), n=1, cutoff=0.3)
-        hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(profile_names())}"
-        raise InputError(f"{kind} profile {name!r}: neither a file nor a preset; {hint}")
+        raise InputError(f"{kind} profile {name!r}: neither a file nor a preset{nearest(name, profile_names())}")
     found = read_profile(path, kind, f"{kind} profile {name!r}")
     points = placed(
         found.points,

@@ -34,6 +34,7 @@ __all__ = [
     "Irregularity",
     "IrregularityParams",
     "at_wheels",
+    "check_wavelength",
     "from_function",
     "make_irregularity",
 ]
@@ -43,6 +44,9 @@ HALF_BASE = 0.75
 
 PATCH_HALF_LENGTH = 6e-3
 """Half length of the contact patch along the rail [m] in the filter of short waves (6 to 7 mm at 70 kN)."""
+
+STEPS_PER_WAVE = 8.0
+"""Fewest steps in which the shortest wave is passed."""
 
 _ROUGHNESS_BLOCK = 64.0  # m, half a block at least: a train then lies in a few blocks, not hundreds
 _MOST_BANDWIDTH = 1e4  # longest over shortest wave; a block then takes 40 MB
@@ -221,11 +225,27 @@ class Irregularity:
         Raises:
             InputError: The shortest wavelength is below 8 V dt.
         """
-        least = 8.0 * speed * dt
-        if self.shortest_wavelength < least:
-            raise InputError(
-                f"irregularity: shortest wavelength = {self.shortest_wavelength:g} m: must be >= 8 V dt = {least:.4g} m"
-            )
+        check_wavelength("irregularity: shortest wavelength", self.shortest_wavelength, speed, dt)
+
+
+def check_wavelength(name: str, wavelength: float, speed: float, dt: float) -> None:
+    """Refuse a wave that a time step cannot follow.
+
+    Args:
+        name: Its name for messages.
+        wavelength: The shortest wavelength [m].
+        speed: Highest speed V [m/s].
+        dt: Time step [s].
+
+    Raises:
+        InputError: The wavelength is below 8 V dt (MODEL §6).
+    """
+    least = STEPS_PER_WAVE * speed * dt
+    if wavelength < least:
+        raise InputError(
+            f"{name} = {wavelength:g}: must be at least {STEPS_PER_WAVE:g} V dt = {least:.4g} m"
+            f" at a time step of {dt:g} s; choose a smaller step or a longer wave"
+        )
 
 
 def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregularity:

@@ -32,6 +32,7 @@ def nearest(name: str, known: list[str] | tuple[str, ...]) -> str:
     """
     folded = {k.casefold(): k for k in known}
     close = difflib.get_close_matches(name.casefold(), list(folded), n=1)
+    close = close or [k for k in folded if k.startswith(name.casefold())]
     if close:
         return f"; did you mean {folded[close[0]]!r}?"
     return f"; known: {', '.join(known)}" if known else ""

@@ -10,14 +10,13 @@ The same declaration is used for validation, HDF5 attributes and the manual. All
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from tiengine.parameters.errors import InputError
+from tiengine.parameters.errors import InputError, nearest
 
 __all__ = ["Name", "Params", "PlainName", "Q", "Source", "build", "explain"]
 
@@ -114,7 +113,7 @@ def explain(error: ValidationError, model: type[BaseModel], where: str = "") -> 
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
     prefix = f"{where}.{key}" if where and key else where or key
     if first["type"] == "extra_forbidden":
-        return f"{prefix}: unknown key{_nearest(str(path[-1]), _known(model, path[:-1]))}"
+        return f"{prefix}: unknown key{nearest(str(path[-1]), _known(model, path[:-1]))}"
     if first["type"] == "missing":
         return f"{prefix}: missing; a value is required"
     # A union reports every alternative it tried; they share the path of the field.
@@ -178,8 +177,3 @@ def _classes(annotation: Any) -> list[type]:
     if isinstance(annotation, type) and not getattr(annotation, "__args__", ()):
         return [annotation]
     return [found for part in getattr(annotation, "__args__", ()) for found in _classes(part)]
-
-
-def _nearest(key: str, known: list[str]) -> str:
-    close = difflib.get_close_matches(key, known, n=1) or [name for name in known if name.startswith(key)]
-    return f"; did you mean {close[0]!r}?" if close else f"; known: {', '.join(known)}" if known else ""

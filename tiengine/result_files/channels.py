@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 __all__ = [
     "BODY", "DEFLECTION", "DIRECTIONS", "DOFS", "GAUGE_FORCE", "GAUGE_MOTION", "GROUPS", "IRREGULARITY", "MORTAR",
-    "SEATS", "SIDES", "SLABS", "WHEEL", "Channel",
+    "SEATS", "SLABS", "WHEEL", "Channel",
 ]  # fmt: skip
 
 
@@ -26,7 +26,6 @@ class Channel(NamedTuple):
     long_name: str
 
 
-SIDES = ("left", "right")
 DOFS = ("y", "z", "roll", "pitch", "yaw")
 DIRECTIONS = ("y", "z")
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.parameters.arrays import Reals
-from tiengine.result_files.channels import DIRECTIONS, DOFS, GROUPS, SIDES, Channel
+from tiengine.parameters.conventions import SIDES
+from tiengine.result_files.channels import DIRECTIONS, DOFS, GROUPS, Channel
 
 __all__ = ["CHUNK", "DTYPES", "SEAT", "SLAB", "TIME", "Axis", "Block", "GroupSpec", "TrainLabels"]
 

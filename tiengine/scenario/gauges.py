@@ -82,7 +82,8 @@ def check_gauges(gauges: Sequence[Gauge], *, begin: float, end: float, slab: Sla
             raise InputError(f"{where}.name = {gauge.name!r}: gauges[{names.index(gauge.name)}] already has this name")
         if not begin <= gauge.chainage <= end:
             raise InputError(
-                f"{where}.chainage = {gauge.chainage:g}: must be between {begin:g} and {end:g} m, the range covered by the window"
+                f"{where}.chainage = {gauge.chainage:g}: must be between {begin:g} and {end:g} m,"
+                " the range covered by the window"
             )
         if gauge.on == "slab":
             _check_slab_gauge(where, gauge, slab)

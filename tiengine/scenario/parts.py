@@ -46,7 +46,9 @@ class ProfilePoints(Params):
     has_cant: Annotated[bool, Field(description="the points are those of a rail already inclined")] = False
     smoothing: Annotated[float, Q("m", "length of the smoothing spline", ge=0, le=5e-3)] = ROUNDING_LENGTH
     mirror: Annotated[bool | None, Field(description="whether the rail's gauge face is at positive y")] = None
-    tape_circle: Annotated[float, Q("m", "distance of a wheel's tape circle outward from the points' y = 0", ge=-0.2, le=0.2)] = 0.0
+    tape_circle: Annotated[
+        float, Q("m", "distance of a wheel's tape circle outward from the points' y = 0", ge=-0.2, le=0.2)
+    ] = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ import numpy as np
 import tomli_w
 from pydantic import Field
 
+from tiengine.irregularity import irregularity as track_irregularity
 from tiengine.irregularity.irregularity import IrregularityParams
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path
@@ -37,7 +38,6 @@ WINDOW_MARGIN_LEAST = 2.0  # m: closer window ends or absorbing zones change the
 LONGEST_RUN = 1e6  # s: the longest distance at 1 m/s
 LONGEST_WINDOW = 2000.0  # m
 MOST_MODES = 3000  # of each rail field: the matrices of a rail then take 2 GB
-STEPS_PER_WAVE = 8.0  # the shortest wave must be passed in no fewer steps (MODEL §6)
 
 
 class Scenario(Params):
@@ -168,9 +168,9 @@ def _members(scenario: Scenario) -> tuple[Scenario, ...]:
 def _check_members(scenario: Scenario) -> None:
     """Check the rules of every train of an ensemble."""
     if scenario.ensemble.seeds and not any(_is_random(train.irregularity) for train in scenario.members):
-        raise InputError("ensemble.seeds: have no effect without a random irregularity; leave them out")
+        raise InputError("ensemble.seeds: no effect without a random irregularity; leave them out")
     if scenario.irregularity.seed + scenario.ensemble.size > 2**63:
-        raise InputError(f"irregularity.seed = {scenario.irregularity.seed}: too large; seeds of all trains must be below 2^63")
+        raise InputError(f"irregularity.seed = {scenario.irregularity.seed}: seeds of all trains must be below 2^63")
     checked: set[str] = set()
     for i, train in enumerate(scenario.members):
         changes = repr(scenario.ensemble.changes(i))
@@ -274,19 +274,13 @@ def check_wavelength(scenario: Scenario, step: float) -> None:
     Raises:
         InputError: The shortest wave is passed in fewer than eight steps (MODEL §6).
     """
-    irregularity = scenario.irregularity
-    shortest = {}
-    if irregularity.spectrum != "none" and irregularity.file is None:
-        shortest["wavelength_min"] = irregularity.wavelength_min
-    if irregularity.short_wave:
-        shortest["short_wave_min"] = irregularity.short_wave_min
-    least = STEPS_PER_WAVE * scenario.train.speed.fastest * step
+    track, shortest = scenario.irregularity, {}
+    if track.spectrum != "none" and track.file is None:
+        shortest["wavelength_min"] = track.wavelength_min
+    if track.short_wave:
+        shortest["short_wave_min"] = track.short_wave_min
     for key, wavelength in shortest.items():
-        if wavelength < least:
-            raise InputError(
-                f"irregularity.{key} = {wavelength:g}: must be at least 8 V dt = {least:.4g} m"
-                f" at a time step of {step:g} s; choose a smaller step or a longer wave"
-            )
+        track_irregularity.check_wavelength(f"irregularity.{key}", wavelength, scenario.train.speed.fastest, step)
 
 
 def duration(train: Scenario) -> float:

@@ -5,6 +5,7 @@ Speeds are in km/h here only; inside they are in m/s.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
@@ -49,20 +50,27 @@ class Train(Params):
         float | Literal["auto"],
         number_or("auto", "m", 0.0, 1e7),
         Field(
-            description="chainage of the first vehicle's centre at t = 0; with \"auto\" the window's rear end is at zero"
+            description="chainage of the first vehicle's centre at t = 0; \"auto\": the window's rear end is at zero"
         ),
     ] = "auto"
     wheel_profile: Annotated[Part, Field(description="part: profile of all wheels")] = "LMA"
     series_springs: Annotated[
-        bool, Field(description="springs in series with dampers (k_series) are modelled; a vehicle may also set this itself")
+        bool,
+        Field(description="springs in series with dampers (k_series) are modelled; a vehicle may also set this itself"),
     ] = False
 
     @property
     def speed(self) -> SpeedProfile:
         """Speed [m/s] over the chainage of the first vehicle's centre [m]."""
-        if isinstance(self.speed_kmh, tuple):
-            return SpeedProfile.table(*zip(*((x, v / 3.6) for x, v in self.speed_kmh), strict=True))
-        return SpeedProfile.constant(self.speed_kmh / 3.6)
+        return _speed_profile(self.speed_kmh)
+
+
+@lru_cache(maxsize=64)
+def _speed_profile(speed_kmh: float | tuple[tuple[float, float], ...]) -> SpeedProfile:
+    """Build a profile once per value; ``Train.speed`` is read several times per chunk of steps."""
+    if isinstance(speed_kmh, tuple):
+        return SpeedProfile.table(*zip(*((x, v / 3.6) for x, v in speed_kmh), strict=True))
+    return SpeedProfile.constant(speed_kmh / 3.6)
 
 
 class Track(Params):
@@ -74,7 +82,9 @@ class Track(Params):
     fastening: Annotated[Part, Field(description="part: spring and damper of a seat")] = "ACE2021"
     friction: Annotated[float, Q("-", "coefficient of friction", gt=0, le=1)] = 0.3
     gauge: Annotated[float, Q("m", "distance between the gauge faces", ge=0.6, le=2.0)] = 1.435
-    gauge_depth: Annotated[float, Q("m", "depth below the top of the rail where gauge is measured", gt=0, le=0.03)] = 0.016
+    gauge_depth: Annotated[float, Q("m", "depth below the top of the rail where gauge is measured", gt=0, le=0.03)] = (
+        0.016
+    )
     cant: Annotated[float, Q("-", "inward inclination of the rail", ge=0, le=0.1)] = 0.025
     mortar_no_tension: Annotated[
         bool, Field(description="the bed transmits no tension; the slab's dead weight counts as pressure")
@@ -137,7 +147,8 @@ class Numerics(Params):
         Literal["equilibrium", "zero"], Field(description="steady rolling, or all parts unloaded and at rest")
     ] = "equilibrium"
     mortar: Annotated[
-        Literal["implicit", "explicit"], Field(description="part of the integration that holds the mortar bed; results are the same")
+        Literal["implicit", "explicit"],
+        Field(description="part of the integration that holds the mortar bed; results are the same"),
     ] = "implicit"
     truncation: Annotated[
         Literal["none", "local"],
@@ -174,11 +185,15 @@ class Output(Params):
     irregularity_channels: Annotated[
         tuple[str, ...], channel_names(IRREGULARITY), Field(description='names, or "all"')
     ] = tuple(IRREGULARITY)
-    envelopes: Annotated[bool, Field(description="whether extremes of every seat and slab are written, groups seats and slabs")] = True
+    envelopes: Annotated[
+        bool, Field(description="whether extremes of every seat and slab are written, groups seats and slabs")
+    ] = True
     deflection_interval: Annotated[
         float | Literal["none"],
         number_or("none", "s", 1e-6, 10.0),
         Field(description="interval between samples of rail and slab along the whole window, group deflection"),
     ] = 0.1
-    precision: Annotated[Literal["single", "double"], Field(description="floating-point format of the channels in the file")] = "single"
+    precision: Annotated[
+        Literal["single", "double"], Field(description="floating-point format of the channels in the file")
+    ] = "single"
     run_in: Annotated[float, Q("m", "initial distance excluded from statistics", ge=0)] = 50.0

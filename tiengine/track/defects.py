@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from tiengine.parameters.conventions import SIDES
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
-from tiengine.track.mortar import MortarVoid, bed_factors
+from tiengine.track.mortar import MortarVoid, check_voids
 from tiengine.track.slab import Slab
 
 __all__ = ["FailedFastenings", "MortarDefect", "check_defects", "fastening_factors"]
-
-SIDES = {"left": (0,), "right": (1,), "both": (0, 1)}
 
 MOST_VOIDS = 100  # of one slab
 
@@ -69,7 +68,7 @@ def fastening_factors(failed: Iterable[FailedFastenings], first: int, count: int
     """
     factors = np.ones((count, 2))
     for row in failed:
-        for side in SIDES[row.rail]:
+        for side in range(2) if row.rail == "both" else [SIDES.index(row.rail)]:
             factors[max(row.seats[0] - first, 0) : max(row.seats[1] + 1 - first, 0), side] *= row.factor
     return factors
 
@@ -100,25 +99,15 @@ def check_defects(
             raise InputError(f"{where}: must be [first, last] with first <= last")
         if row.seats[1] > last_seat:
             raise InputError(f"{where}: must be between 0 and {last_seat}, the last seat of this run")
+    by_slab: dict[int, dict[str, MortarVoid]] = {}
     for i, void in enumerate(voids):
         where = f"track.mortar_voids[{i}]"
         if void.slab > last_slab:
             raise InputError(f"{where}.slab = {void.slab}: must be between 0 and {last_slab}, the last of this run")
-        _check_span(f"{where}.x", void.x, 0.0, slab.length, "the slab's length")
-        _check_span(f"{where}.y", void.y, -slab.width / 2, slab.width / 2, "the slab's width")
-    by_slab: dict[int, list[MortarVoid]] = {}
-    for void in voids:
-        by_slab.setdefault(void.slab, []).append(void.rectangle)
-    for rectangles in by_slab.values():
+        by_slab.setdefault(void.slab, {})[where] = void.rectangle
+    for index, rectangles in by_slab.items():
         if len(rectangles) > MOST_VOIDS:
-            index = rectangles[0].slab
             raise InputError(
-                f"track.mortar_voids: {len(rectangles)} of slab {index}: must be at most {MOST_VOIDS} a slab"
+                f"track.mortar_voids: {len(rectangles)} of slab {index}: must be at most {MOST_VOIDS} per slab"
             )
-        bed_factors(slab.length, slab.width, (1, 1), rectangles)  # refuses voids that overlap
-
-
-def _check_span(where: str, span: tuple[float, float], low: float, high: float, what: str) -> None:
-    if not low <= span[0] < span[1] <= high:
-        rule = f"must be [from, to] with {low:g} <= from < to <= {high:g} m ({what})"
-        raise InputError(f"{where} = {list(span)}: {rule}")
+        check_voids(list(rectangles.values()), slab.length, slab.width, list(rectangles))

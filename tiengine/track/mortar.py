@@ -11,15 +11,15 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationInfo, field_validator
 
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
 
-__all__ = ["GAUSS", "Mortar", "MortarVoid", "bed_factors"]
+__all__ = ["GAUSS", "Mortar", "MortarVoid", "bed_factors", "check_voids"]
 
 GAUSS = 4
-"""Gauss points a direction: N^T N of the ACM shapes has degree 6 in x and in y, four points integrate 7."""
+"""Gauss points per direction: N^T N of the ACM shapes has degree 6 in x and in y, four points integrate 7."""
+ROUNDING = 1e-9  # m
 
 
 class Mortar(Params):
@@ -41,7 +41,7 @@ class Mortar(Params):
 
 
 class MortarVoid(Params):
-    """Rectangle of one slab under which the bed is weaker, missing or (factor > 1) stiffer.
+    """Rectangle of one slab under which the bed is weaker, missing or (factor > 1) stiffer; see :func:`check_voids`.
 
     Attributes:
         slab: Index of the slab along the track, from 0.
@@ -53,19 +53,11 @@ class MortarVoid(Params):
     """
 
     slab: Annotated[int, Q("-", ge=0)]
-    x_from: Annotated[float, Q("m", ge=0.0)]
+    x_from: Annotated[float, Q("m")]
     x_to: Annotated[float, Q("m")]
     y_from: Annotated[float, Q("m")]
     y_to: Annotated[float, Q("m")]
     factor: Annotated[float, Q("-", ge=0.0, le=10.0)] = 0.0
-
-    @field_validator("x_to", "y_to")
-    @classmethod
-    def _ends_after_it_begins(cls, value: float, info: ValidationInfo) -> float:
-        begin = str(info.field_name).replace("to", "from")
-        if begin in info.data and value <= info.data[begin]:
-            raise ValueError(f"must be greater than {begin} = {info.data[begin]:g} m")
-        return value
 
 
 def bed_factors(
@@ -89,8 +81,7 @@ def bed_factors(
     Raises:
         InputError: If a void leaves the slab or overlaps another one.
     """
-    for i, void in enumerate(voids):
-        _check(void, length, width, voids[:i])
+    check_voids(voids, length, width, [f"mortar void on slab {void.slab}" for void in voids])
     factor = np.ones((elements[0], GAUSS, elements[1], GAUSS))
     for void in voids:
         share_x = _shares(elements[0], length, void.x_from, void.x_to)
@@ -111,19 +102,33 @@ def _shares(elements: int, size: float, begin: float, end: float) -> NDArray[np.
     return share.reshape(elements, GAUSS)
 
 
-def _check(void: MortarVoid, length: float, width: float, others: Sequence[MortarVoid]) -> None:
-    """Refuse a void that leaves its slab or overlaps another one (1 nm of rounding is forgiven)."""
-    name = f"mortar void on slab {void.slab}"
-    if void.x_to > length + 1e-9:
-        raise InputError(f"{name}: x_to = {void.x_to:g}: must be <= the slab's length, {length:g} m")
-    for key, y in (("y_from", void.y_from), ("y_to", void.y_to)):
-        if abs(y) > width / 2.0 + 1e-9:
-            raise InputError(f"{name}: {key} = {y:g}: must be within half the slab's width, {width / 2.0:g} m")
-    for other in others:
-        overlap_x = min(void.x_to, other.x_to) - max(void.x_from, other.x_from)
-        overlap_y = min(void.y_to, other.y_to) - max(void.y_from, other.y_from)
-        if other.slab == void.slab and overlap_x > 1e-9 and overlap_y > 1e-9:
-            raise InputError(
-                f"{name}: x_from = {void.x_from:g}: overlaps the void from x = {other.x_from:g} to "
-                f"{other.x_to:g} m; voids of a slab must not overlap"
-            )
+def check_voids(voids: Sequence[MortarVoid], length: float, width: float, names: Sequence[str]) -> None:
+    """Refuse voids that leave their slab or overlap; 1 nm of rounding is tolerated.
+
+    Args:
+        voids: Voids of one slab.
+        length: Length of the slab [m].
+        width: Width of the slab [m].
+        names: Name of each void for messages.
+
+    Raises:
+        InputError: The first void that breaks a rule.
+    """
+    for i, (void, name) in enumerate(zip(voids, names, strict=True)):
+        _check_span(f"{name}.x", (void.x_from, void.x_to), 0.0, length, "the slab's length")
+        _check_span(f"{name}.y", (void.y_from, void.y_to), -width / 2.0, width / 2.0, "the slab's width")
+        for other, other_name in zip(voids[:i], names[:i], strict=True):
+            overlap_x = min(void.x_to, other.x_to) - max(void.x_from, other.x_from)
+            overlap_y = min(void.y_to, other.y_to) - max(void.y_from, other.y_from)
+            if overlap_x > ROUNDING and overlap_y > ROUNDING:
+                raise InputError(
+                    f"{name}.x = [{void.x_from:g}, {void.x_to:g}]: overlaps {other_name}, x = [{other.x_from:g},"
+                    f" {other.x_to:g}] m; voids of a slab must not overlap"
+                )
+
+
+def _check_span(name: str, span: tuple[float, float], low: float, high: float, extent: str) -> None:
+    """Refuse a span that is empty or leaves the slab."""
+    if not low - ROUNDING <= span[0] < span[1] <= high + ROUNDING:
+        rule = f"must be [from, to] with {low:g} <= from < to <= {high:g} m ({extent})"
+        raise InputError(f"{name} = {list(span)}: {rule}")
