@@ -282,7 +282,10 @@ def test_wheels():
         ({"wavelength_min": 0.001}, "wavelength_max = 120.0: must be <= 10000 wavelength_min = 10"),
         ({"seed": -1}, "seed = -1: must be greater than or equal to 0"),
         ({"taper": 0.0}, "taper = 0.0: must be greater than 0"),
-        ({"percentile": 0.9}, "percentile = 0.9: not with the German low-disturbance spectrum"),
+        (
+            {"percentile": 0.9},
+            "percentile = 0.9: must not be set: the German low-disturbance spectrum has no percentiles",
+        ),
         (
             {"short_wave": True, "short_wave_min": 0.5},
             "short_wave_min = 0.5: must be >= 0.002818 and < 0.4467",

@@ -13,8 +13,14 @@ from typing import Annotated, Literal, Protocol
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
-from tiengine.irregularity.given_track import FunctionTrack, MeasuredTrack, UserFunction, function_spline, smooth_step
 from tiengine.irregularity.measured_files import band_passed, read_series
+from tiengine.irregularity.prescribed_track import (
+    FunctionTrack,
+    MeasuredTrack,
+    UserFunction,
+    function_spline,
+    smooth_step,
+)
 from tiengine.irregularity.random_track import BlockSpline, noise_spline
 from tiengine.irregularity.spectrum import (
     CHANNELS,
@@ -49,9 +55,9 @@ _MOST_BANDWIDTH = 1e4  # longest over shortest wave; a block then takes 40 MB
 
 
 class IrregularityParams(Params):
-    """Which irregularity a track has; a ``file`` takes the place of the ``spectrum``.
+    """Parameters of the track irregularity; a ``file`` replaces the ``spectrum``.
 
-    A file's columns and the keys ``file_...`` are explained in docs/files.md.
+    The columns of a file and the keys ``file_...`` are described in docs/files.md.
 
     ``short_wave`` adds the ISO 3095 limit to the vertical of each rail, from its longest band (0.45 m) or
     ``wavelength_min``, whichever is shorter, down to ``short_wave_min``.
@@ -60,26 +66,32 @@ class IrregularityParams(Params):
     spectrum: Annotated[
         str, Field(description='preset of kind irregularity (`tiengine list irregularity`), or "none"')
     ] = "german_low"
-    seed: Annotated[int, Q("-", "names the realisation", ge=0, le=2**63 - 1)] = 1
+    seed: Annotated[int, Q("-", "selects the realisation", ge=0, le=2**63 - 1)] = 1
     wavelength_min: Annotated[float, Q("m", "shortest wave of the spectrum", gt=0, le=1e4)] = 1.0
     wavelength_max: Annotated[float, Q("m", "longest wave of the spectrum", gt=0, le=1e4, validate_default=True)] = (
         120.0
     )
-    two_sided: Annotated[bool, Field(description="the spectrum's constants are those of a two-sided density")] = False
+    two_sided: Annotated[
+        bool, Field(description="the constants of the spectrum are read as those of a two-sided density")
+    ] = False
     scale: Annotated[float, Q("-", "factor on all amplitudes", ge=0)] = 1.0
-    percentile: Annotated[float | None, Q("-", "of the Chinese spectrum; 0.632: mean", gt=0, lt=1)] = None
-    short_wave: Annotated[bool, Field(description="adds the rail roughness of ISO 3095, see above")] = False
+    percentile: Annotated[float | None, Q("-", "percentile of the Chinese spectrum; 0.632 is its mean", gt=0, lt=1)] = (
+        None
+    )
+    short_wave: Annotated[bool, Field(description="adds rail roughness at the ISO 3095 limit, see above")] = False
     short_wave_min: Annotated[float, Q("m", "shortest wave of the rail roughness", gt=0, validate_default=True)] = 0.08
-    taper: Annotated[float, Q("m", "length over which the irregularity begins", gt=0)] = 30.0
+    taper: Annotated[float, Q("m", "length over which the irregularity grows to full amplitude", gt=0)] = 30.0
     file: Annotated[
         str | None,
         Field(description="measured track as CSV (docs/files.md), relative to the scenario", max_length=4096),
     ] = None
-    file_unit: Annotated[Literal["m", "mm"], Field(description="of columns that state none")] = "m"
+    file_unit: Annotated[Literal["m", "mm"], Field(description="unit of columns that state none")] = "m"
     file_start: Annotated[float | None, Q("m", "mileage of the file at chainage zero")] = None
-    file_reverse: Annotated[bool, Field(description="the train runs through the rows from last to first")] = False
-    file_vertical_up: Annotated[bool, Field(description="verticals are up positive in the file")] = False
-    file_band_pass: Annotated[bool, Field(description="keeps waves from wavelength_min to wavelength_max only")] = False
+    file_reverse: Annotated[bool, Field(description="the train passes the rows from last to first")] = False
+    file_vertical_up: Annotated[bool, Field(description="vertical columns are positive upwards")] = False
+    file_band_pass: Annotated[
+        bool, Field(description="keeps only wavelengths from wavelength_min to wavelength_max")
+    ] = False
 
     @field_validator("spectrum")
     @classmethod
@@ -121,18 +133,18 @@ class IrregularityParams(Params):
 
     @property
     def shortest_wavelength(self) -> float:
-        """Shortest wave made from spectra [m]; infinite where there is none."""
+        """Shortest wavelength generated from spectra [m]; infinite where none is used."""
         track = self.wavelength_min if self.spectrum != "none" and self.file is None else np.inf
         return min(track, self.short_wave_min if self.short_wave else np.inf)
 
 
 def _longest_roughness(wavelength_min: float) -> float:
-    """Longest wave of the limit [m], or where the spectrum of the track begins."""
+    """Longest wavelength of the roughness [m]: that of the limit, or the shortest of the track spectrum."""
     return min(wavelength_min, load_roughness().longest)
 
 
 class _Track(Protocol):
-    """Part of a track: values and slopes of its channels at chainages."""
+    """Contribution to a track: values and slopes of its channels at chainages."""
 
     def evaluate(self, x: Reals) -> tuple[Reals, Reals]: ...
 
@@ -150,7 +162,7 @@ class _Roughness:
 
 
 def _from_rails(z: Reals) -> Reals:
-    """Four channels of heights of the left and right railhead, (n, 2) to (n, 4)."""
+    """Convert heights of the left and right railhead to the four channels, (n, 2) to (n, 4)."""
     channels = np.zeros((len(z), len(CHANNELS)))
     channels[:, 0] = 0.5 * (z[:, 0] + z[:, 1])
     channels[:, 2] = (z[:, 1] - z[:, 0]) / (2.0 * HALF_BASE)
@@ -168,13 +180,13 @@ class Irregularity:
         shortest: float,
         reach: tuple[float, float] = (-np.inf, np.inf),
     ) -> None:
-        """Add up parts.
+        """Sum contributions.
 
         Args:
-            parts: What is added.
+            parts: Contributions to be summed.
             taper_start: Chainage before which the track is smooth [m].
             taper: Length over which the irregularity begins [m].
-            shortest: Shortest wavelength of the parts [m]; infinite where not known.
+            shortest: Shortest wavelength of the contributions [m]; infinite where unknown.
             reach: Chainages where a measured track begins and ends [m].
         """
         self.start, self.end = reach
@@ -182,7 +194,7 @@ class Irregularity:
         self.taper_start, self.taper, self.shortest_wavelength = taper_start, taper, shortest
 
     def sample(self, x: Reals) -> Reals:
-        """Irregularity at chainages; the same bits for a chainage in any array and any order.
+        """Evaluate at chainages; a chainage gives the same bits in any array and any order.
 
         Args:
             x: Chainages [m], any shape, any order, any sign.
@@ -212,7 +224,7 @@ class Irregularity:
         return out.reshape(*chainage.shape, -1)
 
     def check_step(self, speed: float, dt: float) -> None:
-        """Refuse waves that the time step cannot follow.
+        """Refuse wavelengths that the time step cannot resolve.
 
         Args:
             speed: Highest speed V [m/s].
@@ -229,10 +241,10 @@ class Irregularity:
 
 
 def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregularity:
-    """Irregularity of a scenario: a file or else a spectrum, and the roughness below it.
+    """Build the irregularity of a scenario: a file or a spectrum, plus the rail roughness.
 
     Args:
-        params: What to make; a ``file`` takes the spectrum's place.
+        params: Parameters; a ``file`` replaces the spectrum.
         taper_start: Chainage where the irregularity begins [m], ahead of the leading wheel.
 
     Raises:
@@ -244,7 +256,7 @@ def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregul
         measured = MeasuredTrack(_measured_series(params, params.file), params.taper)
         if measured.end <= taper_start:
             raise InputError(
-                f"irregularity.file = {params.file!r}: ends at chainage {measured.end:g} m, before the train's way"
+                f"irregularity.file = {params.file!r}: ends at chainage {measured.end:g} m, before the run"
                 " begins; set file_start to the mileage of chainage zero"
             )
         parts.append(measured)
@@ -256,35 +268,35 @@ def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregul
     if params.short_wave:
         roughness = load_roughness()
 
-        def felt(Omega: Reals) -> Reals:
+        def filtered(Omega: Reals) -> Reals:
             return params.scale**2 * roughness.density(Omega) * contact_filter(Omega, PATCH_HALF_LENGTH)
 
         band = (params.short_wave_min, params.short_wave_max)
-        rails = noise_spline(params.seed, (4, 5), (felt, felt), band, shortest_block=_ROUGHNESS_BLOCK)
+        rails = noise_spline(params.seed, (4, 5), (filtered, filtered), band, shortest_block=_ROUGHNESS_BLOCK)
         parts.append(_Roughness(rails))
     return Irregularity(parts, taper_start, params.taper, shortest, reach)
 
 
 def check_reach(tracks: Iterable[Irregularity], end: float) -> None:
-    """Refuse a measured track that the train never comes to.
+    """Refuse a measured track that the train never reaches.
 
     Args:
         tracks: Irregularity of each train.
-        end: Chainage of the leading wheel at the end of the way [m].
+        end: Chainage of the leading wheel at the end of the run [m].
 
     Raises:
-        InputError: A track begins behind it.
+        InputError: A track begins beyond it.
     """
     for track in tracks:
         if track.start >= end:
             raise InputError(
-                f"irregularity.file: begins at chainage {track.start:g} m: must be before the end of the way, {end:g}"
+                f"irregularity.file: begins at chainage {track.start:g} m: must be before the end of the run, {end:g}"
                 " m; set file_start to the mileage of chainage zero"
             )
 
 
 def _measured_series(params: IrregularityParams, file: str) -> Reals:
-    """Chainage and channels of a file as the train is to meet them, shape (n, 5)."""
+    """Read chainage and channels of a file in the direction of travel, shape (n, 5)."""
     series = read_series(
         file,
         unit=params.file_unit,
@@ -298,7 +310,7 @@ def _measured_series(params: IrregularityParams, file: str) -> Reals:
 
 
 def _track_densities(params: IrregularityParams) -> list[Density]:
-    """Densities as realised: scaled, one- or two-sided, the rails' heights as the patch feels them."""
+    """Densities of the realisation: scaled, one- or two-sided, rail heights filtered by the contact patch."""
     spectrum = load_spectrum(params.spectrum)
     factor = params.scale**2 * (2.0 if params.two_sided else 1.0)
     if params.percentile is not None:
@@ -319,19 +331,19 @@ def from_function(
     taper: float = 30.0,
     spacing: float = 0.05,
 ) -> Irregularity:
-    """Irregularity given by a user's function.
+    """Build the irregularity from a user's function.
 
     Args:
         f: Chainages (n,) to z_v, y_a, theta, g, each (n,) or a number.
         slopes: The derivatives of f by x, in the same form. Without them f is replaced by the C2 spline
             through its values at multiples of ``spacing``, with an error of (2 pi spacing/lambda)^4/384.
         taper_start: Chainage where the irregularity begins [m].
-        taper: Length over which it begins [m].
+        taper: Length over which it grows to full amplitude [m].
         spacing: Grid of the spline [m].
 
     Raises:
-        InputError: ``taper`` or ``spacing`` is not positive; later, when sampled: f does not give four finite
-            series.
+        InputError: ``taper`` or ``spacing`` is not positive; later, when sampled: f does not return four
+            finite series.
     """
     for name, value in (("taper", taper), ("spacing", spacing)):
         if not value > 0.0:
@@ -341,7 +353,7 @@ def from_function(
 
 
 def at_wheels(channels: Reals) -> Reals:
-    """Irregularity of the left and right railhead.
+    """Convert the channels to the irregularity of the left and right railhead.
 
     Args:
         channels: Result of :meth:`Irregularity.sample`, shape (..., 8).

@@ -22,15 +22,15 @@ __all__ = ["FailedFastenings", "MortarDefect", "check_defects", "fastening_facto
 
 SIDES = {"left": (0,), "right": (1,), "both": (0, 1)}
 
-MOST_VOIDS = 100  # of one slab
+MOST_VOIDS = 100  # per slab
 
 SeatIndex = Annotated[int, Field(ge=0)]
 
 
 class FailedFastenings(Params):
-    """A row of neighbouring fastenings of one rail or both, scaled by a factor."""
+    """Consecutive fastenings of one rail or both, scaled by a factor."""
 
-    rail: Annotated[Literal["left", "right", "both"], Field(description="which rail's")] = "both"
+    rail: Annotated[Literal["left", "right", "both"], Field(description="rail of the fastenings")] = "both"
     seats: Annotated[
         tuple[SeatIndex, SeatIndex],
         Field(description="first and last; seat j stands at (j + 1/2) seat pitches"),
@@ -51,21 +51,21 @@ class MortarDefect(Params):
 
     @property
     def rectangle(self) -> MortarVoid:
-        """The void in the form that the slab's matrices take."""
+        """The void in the form used by the slab matrices."""
         x, y = self.x, self.y
         return MortarVoid(slab=self.slab, x_from=x[0], x_to=x[1], y_from=y[0], y_to=y[1], factor=self.factor)
 
 
 def fastening_factors(failed: Iterable[FailedFastenings], first: int, count: int) -> NDArray[np.float64]:
-    """Factors of a row of seats.
+    """Return the factors of consecutive seats.
 
     Args:
-        failed: Rows of the scenario; where two overlap, their factors multiply.
+        failed: Entries of the scenario; where two overlap, their factors multiply.
         first: Index of the first seat.
         count: Number of seats.
 
     Returns:
-        Factors, 1 where sound, shape (count, 2); side 0 is left.
+        Factors, 1 where intact, shape (count, 2); side 0 is left.
     """
     factors = np.ones((count, 2))
     for row in failed:
@@ -81,13 +81,13 @@ def check_defects(
     end: float,
     slab: Slab,
 ) -> None:
-    """Refuse defects that the run never meets or that lie outside a slab.
+    """Refuse defects that the run never reaches or that lie outside a slab.
 
     Args:
         failed: Fastenings of the scenario.
         voids: Voids of the scenario.
         end: Chainage of the window's front end at the end of the run [m].
-        slab: Gives the pitches of seats and slabs and a slab's size.
+        slab: Slab with its dimensions and the pitches of seats and slabs.
 
     Raises:
         InputError: Names the entry, its value and the range.
@@ -113,12 +113,12 @@ def check_defects(
         if len(rectangles) > MOST_VOIDS:
             index = rectangles[0].slab
             raise InputError(
-                f"track.mortar_voids: {len(rectangles)} of slab {index}: must be at most {MOST_VOIDS} a slab"
+                f"track.mortar_voids: {len(rectangles)} on slab {index}: must be at most {MOST_VOIDS} per slab"
             )
-        bed_factors(slab.length, slab.width, (1, 1), rectangles)  # refuses voids that overlap
+        bed_factors(slab.length, slab.width, (1, 1), rectangles)  # refuses overlapping voids
 
 
-def _check_span(where: str, span: tuple[float, float], low: float, high: float, what: str) -> None:
+def _check_span(where: str, span: tuple[float, float], low: float, high: float, limit: str) -> None:
     if not low <= span[0] < span[1] <= high:
-        rule = f"must be [from, to] with {low:g} <= from < to <= {high:g} m ({what})"
+        rule = f"must be [from, to] with {low:g} <= from < to <= {high:g} m ({limit})"
         raise InputError(f"{where} = {list(span)}: {rule}")

@@ -1,4 +1,4 @@
-"""Mortar bed under the slabs: a Winkler foundation, its voids, its quadrature.
+"""Mortar bed under the slabs: Winkler foundation, voids and quadrature.
 
 The bed presses on the slab with k_m w + c_m dw/dt per area, consistent with the plate's shape functions
 (integral of N^T N), and holds its rigid lateral motion. A void scales both over a rectangle of one slab.
@@ -19,7 +19,7 @@ from tiengine.parameters.quantity import Params, Q
 __all__ = ["GAUSS", "Mortar", "MortarVoid", "bed_factors"]
 
 GAUSS = 4
-"""Gauss points a direction: N^T N of the ACM shapes has degree 6 in x and in y, four points integrate 7."""
+"""Gauss points per direction: N^T N of the ACM shapes has degree 6 in x and in y, four points integrate 7."""
 
 
 class Mortar(Params):
@@ -49,7 +49,7 @@ class MortarVoid(Params):
         x_to: End, from the slab's rear edge.
         y_from: Left edge, from the slab's centre line, positive to the right.
         y_to: Right edge, from the slab's centre line.
-        factor: What k_m and c_m (and the lateral bed) are multiplied with; 0 is a void.
+        factor: Factor on k_m and c_m and on the lateral bed; 0 is a void.
     """
 
     slab: Annotated[int, Q("-", ge=0)]
@@ -71,7 +71,7 @@ class MortarVoid(Params):
 def bed_factors(
     length: float, width: float, elements: tuple[int, int], voids: Sequence[MortarVoid]
 ) -> NDArray[np.float64]:
-    """Bed factor at every quadrature point of one slab.
+    """Compute the bed factor at every quadrature point of one slab.
 
     An element's quadrature points own cells whose sides are the Gauss weights, so the cells tile the slab. A
     point's factor is 1 - sum (1 - factor) (share of its cell under the void): the area and the total
@@ -87,7 +87,7 @@ def bed_factors(
         Factors, shape (elements, GAUSS^2), element ex n_y + ey, point GAUSS qx + qy.
 
     Raises:
-        InputError: If a void leaves the slab or overlaps another one.
+        InputError: A void extends beyond the slab or overlaps another one.
     """
     for i, void in enumerate(voids):
         _check(void, length, width, voids[:i])
@@ -101,7 +101,7 @@ def bed_factors(
 
 
 def _shares(elements: int, size: float, begin: float, end: float) -> NDArray[np.float64]:
-    """Share of every point's cell between two places from the slab's edge [m], shape (elements, GAUSS)."""
+    """Share of the cell of every point between two distances from the slab edge [m], shape (elements, GAUSS)."""
     weight = np.polynomial.legendre.leggauss(GAUSS)[1] / 2.0
     within = np.append(0.0, np.cumsum(weight[:-1]))
     left = size / elements * (np.arange(elements)[:, None] + within).ravel()
@@ -112,7 +112,7 @@ def _shares(elements: int, size: float, begin: float, end: float) -> NDArray[np.
 
 
 def _check(void: MortarVoid, length: float, width: float, others: Sequence[MortarVoid]) -> None:
-    """Refuse a void that leaves its slab or overlaps another one (1 nm of rounding is forgiven)."""
+    """Refuse a void that extends beyond its slab or overlaps another one (1 nm is allowed for rounding)."""
     name = f"mortar void on slab {void.slab}"
     if void.x_to > length + 1e-9:
         raise InputError(f"{name}: x_to = {void.x_to:g}: must be <= the slab's length, {length:g} m")

@@ -95,7 +95,7 @@ def test_bad_function_is_refused():
     """Spacing, number of series, values and shape."""
     with pytest.raises(InputError, match=r"irregularity.spacing = 0: must be > 0"):
         from_function(lambda x: (x, x, x, x), taper_start=0.0, spacing=0.0)
-    with pytest.raises(InputError, match="gives 2 series; must be 4"):
+    with pytest.raises(InputError, match="returns 2 series; must return 4"):
         from_function(lambda x: (x, x), taper_start=FAR).sample(np.zeros(1))
     with pytest.raises(InputError, match="must be finite everywhere"):
         from_function(lambda x: (x, x, x, x * np.nan), taper_start=FAR).sample(np.zeros(1))

@@ -1,4 +1,4 @@
-"""Given tracks: a measured series (:mod:`tiengine.irregularity.measured_files`) or a user's function of chainage."""
+"""Prescribed track: a measured series (:mod:`tiengine.irregularity.measured_files`) or a function of chainage."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ CHANNELS = 4
 
 
 class MeasuredTrack:
-    """Natural cubic splines through a series, faded in and out at its ends, zero outside."""
+    """Natural cubic splines through a series, tapered at both ends, zero outside."""
 
     def __init__(self, series: Reals, taper: float) -> None:
-        """Join the points.
+        """Fit the splines.
 
         Args:
             series: Chainage and four channels as ``read_series`` returns them, shape (n, 5).
-            taper: Length of the fade at either end [m]; at most half the series is used for each.
+            taper: Length of the taper at either end [m]; at most half of the series.
         """
         x = series[:, 0]
         self.start, self.end = float(x[0]), float(x[-1])
@@ -45,8 +45,8 @@ class MeasuredTrack:
 
     def evaluate(self, x: Reals) -> tuple[Reals, Reals]:
         """Values and slopes of the four channels at chainages x [m], shape (n,); each of shape (n, 4)."""
-        held = np.clip(x, self.start, self.end)
-        value, slope = self._value(held), self._slope(held)
+        clipped = np.clip(x, self.start, self.end)
+        value, slope = self._value(clipped), self._slope(clipped)
         up, up_slope = smooth_step((x - self.start) / self.taper)
         down, down_slope = smooth_step((self.end - x) / self.taper)
         T, T_slope = up * down, (up_slope * down - up * down_slope) / self.taper
@@ -54,16 +54,16 @@ class MeasuredTrack:
 
 
 def smooth_step(t: Reals) -> tuple[Reals, Reals]:
-    """The C2 step 6 t^5 - 15 t^4 + 10 t^3 from 0 at t <= 0 to 1 at t >= 1, and its derivative by t."""
+    """Evaluate the C2 step 6 t^5 - 15 t^4 + 10 t^3 from 0 at t <= 0 to 1 at t >= 1, and its derivative by t."""
     s = np.clip(t, 0.0, 1.0)
     return s * s * s * (10.0 + s * (6.0 * s - 15.0)), 30.0 * s * s * (1.0 - s) * (1.0 - s)
 
 
 class FunctionTrack:
-    """A user's function with the user's own slopes."""
+    """Track given by a user's function and its derivative."""
 
     def __init__(self, f: UserFunction, slopes: UserFunction) -> None:
-        """Keep the function of values and that of slopes."""
+        """Store the function and its derivative."""
         self._value, self._slope = _columns(f, "function"), _columns(slopes, "slopes")
 
     def evaluate(self, x: Reals) -> tuple[Reals, Reals]:
@@ -72,18 +72,17 @@ class FunctionTrack:
 
 
 def function_spline(f: UserFunction, spacing: float) -> BlockSpline:
-    """The C2 spline through a user's function at all multiples of ``spacing`` [m]."""
+    """Build the C2 spline through a user's function at all multiples of ``spacing`` [m]."""
     return sampled_spline(_columns(f, "function"), spacing, CHANNELS)
 
 
 def _columns(f: UserFunction, name: str) -> Callable[[Reals], Reals]:
-    """The function with its four results checked and stacked, (n,) to (n, 4)."""
-    wanted = CHANNELS
+    """Wrap the function: check its four series and stack them, (n,) to (n, 4)."""
 
     def stacked(x: Reals) -> Reals:
         results = f(x)
-        if len(results) != wanted:
-            raise InputError(f"irregularity.{name}: gives {len(results)} series; must be {wanted}")
+        if len(results) != CHANNELS:
+            raise InputError(f"irregularity.{name}: returns {len(results)} series; must return {CHANNELS}")
         try:
             columns = [np.broadcast_to(np.asarray(r, np.float64), x.shape) for r in results]
         except ValueError:
