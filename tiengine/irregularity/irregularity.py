@@ -37,6 +37,7 @@ from tiengine.parameters.quantity import Params, Q
 __all__ = [
     "HALF_BASE",
     "PATCH_HALF_LENGTH",
+    "STEPS_PER_WAVE",
     "Irregularity",
     "IrregularityParams",
     "at_wheels",
@@ -49,6 +50,9 @@ HALF_BASE = 0.75
 
 PATCH_HALF_LENGTH = 6e-3
 """Half length of the contact patch along the rail [m] in the filter of short waves (6 to 7 mm at 70 kN)."""
+
+STEPS_PER_WAVE = 8.0
+"""Fewest time steps in which a wheel may pass the shortest wavelength (MODEL §6)."""
 
 _ROUGHNESS_BLOCK = 64.0  # m, half a block at least: a train then lies in a few blocks, not hundreds
 _MOST_BANDWIDTH = 1e4  # longest over shortest wave; a block then takes 40 MB
@@ -233,7 +237,7 @@ class Irregularity:
         Raises:
             InputError: The shortest wavelength is below 8 V dt.
         """
-        least = 8.0 * speed * dt
+        least = STEPS_PER_WAVE * speed * dt
         if self.shortest_wavelength < least:
             raise InputError(
                 f"irregularity: shortest wavelength = {self.shortest_wavelength:g} m: must be >= 8 V dt = {least:.4g} m"

@@ -5,7 +5,7 @@ unit in brackets: ``distance [km], vertical_left [mm], vertical_right [mm], cros
 
 | columns | meaning |
 |---|---|
-| ``x``, ``distance``, ``chainage``, ``mileage`` | along the track [m]; strictly rising or falling; exactly one of them |
+| ``x``, ``distance``, ``chainage``, ``mileage`` | along the track [m]; rising or falling throughout; exactly one |
 | ``z_v`` or ``vertical``; ``vertical_left`` and ``vertical_right`` | height of the rails, down positive |
 | ``theta`` [rad] or ``cross_level`` | left rail above right; as a height over 1.5 m |
 | ``y_a`` or ``alignment``; ``alignment_left`` and ``alignment_right`` | position of the rails, right positive |

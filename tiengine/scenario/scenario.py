@@ -16,7 +16,7 @@ import numpy as np
 import tomli_w
 from pydantic import Field
 
-from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.irregularity import STEPS_PER_WAVE, IrregularityParams
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path
 from tiengine.parameters.presets import find_preset
@@ -28,7 +28,6 @@ from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
 from tiengine.track.defects import check_defects
-from tiengine.track.mortar import MortarVoid
 
 __all__ = ["Scenario", "check_wavelength", "duration", "load_scenario", "to_toml"]
 
@@ -37,7 +36,6 @@ WINDOW_MARGIN_LEAST = 2.0  # m: below this the window's fixed ends, or an absorb
 LONGEST_RUN = 1e6  # s: the longest way at 1 m/s
 LONGEST_WINDOW = 2000.0  # m
 MOST_MODES = 3000  # of each rail field: the matrices of a rail then take 2 GB
-STEPS_PER_WAVE = 8.0  # the shortest wave must be passed in no fewer steps (MODEL §6)
 
 
 class Scenario(Params):
@@ -69,11 +67,6 @@ class Scenario(Params):
     def parts(self) -> Parts:
         """The parts that the scenario names, built and checked once."""
         return build_parts(self.train, self.track, self.presets)
-
-    @property
-    def mortar_voids(self) -> tuple[MortarVoid, ...]:
-        """Voids of the whole track, as the slab's matrices want them."""
-        return tuple(void.rectangle for void in self.track.mortar_voids)
 
     @cached_property
     def window_length(self) -> float:

@@ -14,16 +14,14 @@ from typing import Annotated
 import numpy as np
 from pydantic import ValidationInfo, field_validator
 
+from tiengine.parameters.constants import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset, preset_names
 from tiengine.parameters.quantity import Params, Q, build
 from tiengine.track.mortar import Mortar
 
-__all__ = ["GRAVITY", "Slab", "load_slab", "slab_names"]
-
-GRAVITY = 9.81
-"""Acceleration of gravity [m/s^2]."""
+__all__ = ["Slab", "load_slab", "slab_names"]
 
 MOST_DOFS = 5000  # per slab, since its matrices are full
 THIN = 0.1

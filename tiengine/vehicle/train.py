@@ -22,15 +22,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.parameters.constants import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.vehicle.assembly import Assembly, Element, PlacedBody, longitudinal_push, spin_push
 from tiengine.vehicle.connector import extend_table
 from tiengine.vehicle.vehicle import Vehicle
 
-__all__ = ["GRAVITY", "MOTIONS", "TrainModel", "assemble", "static_wheel_loads", "train_centres"]
+__all__ = ["MOTIONS", "TrainModel", "assemble", "static_wheel_loads", "train_centres"]
 
-GRAVITY = 9.81
-"""Acceleration of free fall [m/s^2]."""
 MOTIONS = ("y", "z", "roll", "pitch", "yaw")
 """Order of a body's coordinates."""
 
