@@ -14,13 +14,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
 from tiengine.irregularity.measured_files import band_passed, read_series
-from tiengine.irregularity.prescribed_track import (
-    FunctionTrack,
-    MeasuredTrack,
-    UserFunction,
-    function_spline,
-    smooth_step,
-)
+from tiengine.irregularity.measured_track import MeasuredTrack, smooth_step
 from tiengine.irregularity.random_track import BlockSpline, noise_spline
 from tiengine.irregularity.spectrum import (
     CHANNELS,
@@ -30,6 +24,7 @@ from tiengine.irregularity.spectrum import (
     load_spectrum,
     spectrum_names,
 )
+from tiengine.irregularity.track_function import TrackFunction
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.quantity import Params, Q
@@ -41,8 +36,10 @@ __all__ = [
     "Irregularity",
     "IrregularityParams",
     "at_wheels",
-    "from_function",
+    "check_reach",
+    "check_step",
     "make_irregularity",
+    "shortest_wavelength",
 ]
 
 HALF_BASE = 0.75
@@ -60,6 +57,9 @@ _MOST_BANDWIDTH = 1e4  # longest over shortest wave; a block then takes 40 MB
 
 class IrregularityParams(Params):
     """Parameters of the track irregularity; a ``file`` replaces the ``spectrum``.
+
+    A Python function replaces both: ``tiengine.run(scenario, irregularity=f)`` sets ``function`` to its name, which
+    records in the result that the track was given by a function; it cannot be run from a file.
 
     The columns of a file and the keys ``file_...`` are described in docs/files.md.
 
@@ -88,6 +88,9 @@ class IrregularityParams(Params):
     file: Annotated[
         str | None,
         Field(description="measured track as CSV (docs/files.md), relative to the scenario", max_length=4096),
+    ] = None
+    function: Annotated[
+        str | None, Field(description="name of the Python function that gives the track; set by `tiengine.run`")
     ] = None
     file_unit: Annotated[Literal["m", "mm"], Field(description="unit of columns that state none")] = "m"
     file_start: Annotated[float | None, Q("m", "mileage of the file at chainage zero")] = None
@@ -122,6 +125,13 @@ class IrregularityParams(Params):
             load_spectrum(info.data["spectrum"]).mean_factor(percentile)
         return percentile
 
+    @field_validator("function")
+    @classmethod
+    def _is_alone(cls, function: str | None, info: ValidationInfo) -> str | None:
+        if function is not None and info.data.get("file") is not None:
+            raise ValueError("must not be set together with irregularity.file")
+        return function
+
     @field_validator("short_wave_min")
     @classmethod
     def _is_within_limit(cls, short_wave_min: float, info: ValidationInfo) -> float:
@@ -131,6 +141,11 @@ class IrregularityParams(Params):
         return short_wave_min
 
     @property
+    def has_spectrum(self) -> bool:
+        """Whether the track, apart from rail roughness, is random."""
+        return self.spectrum != "none" and self.file is None and self.function is None
+
+    @property
     def short_wave_max(self) -> float:
         """Longest wave of the rail roughness [m]."""
         return _longest_roughness(self.wavelength_min)
@@ -138,7 +153,7 @@ class IrregularityParams(Params):
     @property
     def shortest_wavelength(self) -> float:
         """Shortest wavelength generated from spectra [m]; infinite where none is used."""
-        track = self.wavelength_min if self.spectrum != "none" and self.file is None else np.inf
+        track = self.wavelength_min if self.has_spectrum else np.inf
         return min(track, self.short_wave_min if self.short_wave else np.inf)
 
 
@@ -165,6 +180,18 @@ class _Roughness:
         return _from_rails(value), _from_rails(slope)
 
 
+class _Scaled:
+    """A contribution times a factor."""
+
+    def __init__(self, track: _Track, factor: float) -> None:
+        self._track, self._factor = track, factor
+
+    def evaluate(self, x: Reals) -> tuple[Reals, Reals]:
+        """Values and slopes of the four channels, each of shape (n, 4)."""
+        value, slope = self._track.evaluate(x)
+        return self._factor * value, self._factor * slope
+
+
 def _from_rails(z: Reals) -> Reals:
     """Convert heights of the left and right railhead to the four channels, (n, 2) to (n, 4)."""
     channels = np.zeros((len(z), len(CHANNELS)))
@@ -174,7 +201,7 @@ def _from_rails(z: Reals) -> Reals:
 
 
 class Irregularity:
-    """Irregularity at any chainage; build it with :func:`make_irregularity` or :func:`from_function`."""
+    """Irregularity at any chainage; build it with :func:`make_irregularity`."""
 
     def __init__(
         self,
@@ -227,32 +254,35 @@ class Irregularity:
             value *= T[:, None]
         return out.reshape(*chainage.shape, -1)
 
-    def check_step(self, speed: float, dt: float) -> None:
-        """Refuse wavelengths that the time step cannot resolve.
 
-        Args:
-            speed: Highest speed V [m/s].
-            dt: Time step [s].
+def check_step(shortest: float, speed: float, dt: float) -> None:
+    """Refuse wavelengths that the time step cannot resolve.
 
-        Raises:
-            InputError: The shortest wavelength is below 8 V dt.
-        """
-        least = STEPS_PER_WAVE * speed * dt
-        if self.shortest_wavelength < least:
-            raise InputError(
-                f"irregularity: shortest wavelength = {self.shortest_wavelength:g} m: must be >= 8 V dt = {least:.4g} m"
-            )
+    Args:
+        shortest: Shortest wavelength of the track [m].
+        speed: Highest speed V [m/s].
+        dt: Time step [s].
+
+    Raises:
+        InputError: The shortest wavelength is below 8 V dt.
+    """
+    least = STEPS_PER_WAVE * speed * dt
+    if shortest < least:
+        raise InputError(f"irregularity: shortest wavelength = {shortest:g} m: must be >= 8 V dt = {least:.4g} m")
 
 
-def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregularity:
-    """Build the irregularity of a scenario: a file or a spectrum, plus the rail roughness.
+def make_irregularity(
+    params: IrregularityParams, taper_start: float, function: TrackFunction | None = None
+) -> Irregularity:
+    """Build the irregularity of a scenario: a function, a file or a spectrum, plus the rail roughness.
 
     Args:
         params: Parameters; a ``file`` replaces the spectrum.
         taper_start: Chainage where the irregularity begins [m], ahead of the leading wheel.
+        function: Function that the parameters name.
 
     Raises:
-        InputError: The file breaks a rule.
+        InputError: The file breaks a rule, or the function is missing.
     """
     parts: list[_Track] = []
     shortest, reach = params.shortest_wavelength, (-np.inf, np.inf)
@@ -266,6 +296,13 @@ def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregul
         parts.append(measured)
         reach = (measured.start, measured.end)
         shortest = min(shortest, max(measured.shortest, params.wavelength_min if params.file_band_pass else 0.0))
+    elif params.function is not None:
+        if function is None:
+            raise InputError(
+                f"irregularity.function = {params.function!r}: the Python function itself is missing; pass it as"
+                " tiengine.run(scenario, irregularity=function)"
+            )
+        parts.append(_Scaled(function.track(), params.scale))
     elif params.spectrum != "none":
         band = (params.wavelength_min, params.wavelength_max)
         parts.append(noise_spline(params.seed, range(4), _track_densities(params), band))
@@ -279,6 +316,18 @@ def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregul
         rails = noise_spline(params.seed, (4, 5), (filtered, filtered), band, shortest_block=_ROUGHNESS_BLOCK)
         parts.append(_Roughness(rails))
     return Irregularity(parts, taper_start, params.taper, shortest, reach)
+
+
+def shortest_wavelength(params: IrregularityParams) -> float:
+    """Shortest wavelength that the time step must resolve [m]; infinite where unknown, as for a function.
+
+    Args:
+        params: Parameters; a file is read.
+
+    Raises:
+        InputError: The file breaks a rule.
+    """
+    return params.shortest_wavelength if params.file is None else make_irregularity(params, -np.inf).shortest_wavelength
 
 
 def check_reach(tracks: Iterable[Irregularity], end: float) -> None:
@@ -325,35 +374,6 @@ def _track_densities(params: IrregularityParams) -> list[Density]:
         return lambda Omega: factor * spectrum.density(channel, Omega) * contact_filter(Omega, a)
 
     return [density(channel) for channel in CHANNELS]
-
-
-def from_function(
-    f: UserFunction,
-    *,
-    slopes: UserFunction | None = None,
-    taper_start: float,
-    taper: float = 30.0,
-    spacing: float = 0.05,
-) -> Irregularity:
-    """Build the irregularity from a user's function.
-
-    Args:
-        f: Chainages (n,) to z_v, y_a, theta, g, each (n,) or a number.
-        slopes: The derivatives of f by x, in the same form. Without them f is replaced by the C2 spline
-            through its values at multiples of ``spacing``, with an error of (2 pi spacing/lambda)^4/384.
-        taper_start: Chainage where the irregularity begins [m].
-        taper: Length over which it grows to full amplitude [m].
-        spacing: Grid of the spline [m].
-
-    Raises:
-        InputError: ``taper`` or ``spacing`` is not positive; later, when sampled: f does not return four
-            finite series.
-    """
-    for name, value in (("taper", taper), ("spacing", spacing)):
-        if not value > 0.0:
-            raise InputError(f"irregularity.{name} = {value:g}: must be > 0")
-    track = FunctionTrack(f, slopes) if slopes is not None else function_spline(f, spacing)
-    return Irregularity([track], taper_start, taper, np.inf)
 
 
 def at_wheels(channels: Reals) -> Reals:

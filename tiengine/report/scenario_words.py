@@ -68,6 +68,8 @@ def _irregularity(scenario: Scenario) -> str:
     track = scenario.irregularity
     if track.file is not None:
         words = f"measured, {Path(track.file).name}"
+    elif track.function is not None:
+        words = f"given by the Python function {track.function}"
     elif track.spectrum == "none":
         words = "none, a smooth track"
     else:

@@ -161,7 +161,7 @@ def _members(scenario: Scenario) -> tuple[Scenario, ...]:
 def _check_members(scenario: Scenario) -> None:
     """Rules for every train of an ensemble."""
     if scenario.ensemble.seeds and not any(_is_random(train.irregularity) for train in scenario.members):
-        raise InputError("ensemble.seeds: make no difference to a measured irregularity or to none; leave them out")
+        raise InputError("ensemble.seeds: must be left out where no train has a random irregularity")
     if scenario.irregularity.seed + scenario.ensemble.size > 2**63:
         raise InputError(f"irregularity.seed = {scenario.irregularity.seed}: leaves no seeds for all trains")
     checked: set[str] = set()
@@ -177,7 +177,7 @@ def _check_members(scenario: Scenario) -> None:
 
 def _is_random(track: IrregularityParams) -> bool:
     """Whether a seed makes a difference."""
-    return track.short_wave or (track.file is None and track.spectrum != "none")
+    return track.short_wave or track.has_spectrum
 
 
 def _absolute_vary(ensemble: Ensemble, folder: Path | None) -> Ensemble:
@@ -269,7 +269,7 @@ def check_wavelength(scenario: Scenario, step: float) -> None:
     """
     irregularity = scenario.irregularity
     shortest = {}
-    if irregularity.spectrum != "none" and irregularity.file is None:
+    if irregularity.has_spectrum:
         shortest["wavelength_min"] = irregularity.wavelength_min
     if irregularity.short_wave:
         shortest["short_wave_min"] = irregularity.short_wave_min
