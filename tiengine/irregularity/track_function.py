@@ -53,6 +53,14 @@ class TrackFunction:
         self._functions: tuple[UserFunction, UserFunction | None] | None = (f, slopes)
         self._pickled = b""
 
+    def check_picklable(self) -> None:
+        """Refuse a function that cannot be sent to a worker process.
+
+        Raises:
+            InputError: It cannot be pickled.
+        """
+        self.__getstate__()
+
     def __getstate__(self) -> dict[str, Any]:
         """Pickle the functions by themselves, so that unpickling this object imports nothing.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
@@ -173,7 +172,9 @@ class _Job:
             InputError: One cannot be pickled.
         """
         if self.count(tasks) > 1:
-            pickle.dumps([task.functions for task in tasks])
+            for task in tasks:
+                for function in task.functions:
+                    function.check_picklable()
 
     def do(self, writer: Writer, gathering: Gathering, tasks: Sequence[Task]) -> Result:
         """Run tasks into a file and complete it."""
