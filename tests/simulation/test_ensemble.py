@@ -131,7 +131,10 @@ def test_measured_files_are_found_beside_the_scenario(tmp_path):
         ({"size": 2, "vary": {"ensemble.size": [1, 2]}}, "'ensemble.size' cannot vary"),
         ({"size": 2, "vary": {"numerics.threads": [1, 2]}}, "'numerics.threads' cannot vary"),
         ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.seed": [1, 2]}}, "'irregularity.seed' cannot vary if"),
-        ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.spectrum": ["none"]}}, "ensemble.seeds: no effect without"),
+        (
+            {"size": 2, "seeds": [1, 2], "vary": {"irregularity.spectrum": ["none"]}},
+            "ensemble.seeds: no effect without",
+        ),
     ],
 )
 def test_bad_input_names_the_train_and_the_key(settings, message):

@@ -16,8 +16,7 @@ import numpy as np
 import tomli_w
 from pydantic import Field
 
-from tiengine.irregularity import irregularity as track_irregularity
-from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.irregularity import IrregularityParams, check_step
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path
 from tiengine.parameters.presets import find_preset
@@ -29,7 +28,6 @@ from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
 from tiengine.track.defects import check_defects
-from tiengine.track.mortar import MortarVoid
 
 __all__ = ["Scenario", "check_wavelength", "duration", "load_scenario", "to_toml"]
 
@@ -69,11 +67,6 @@ class Scenario(Params):
     def parts(self) -> Parts:
         """Parts that the scenario refers to, built and checked once."""
         return build_parts(self.train, self.track, self.presets)
-
-    @property
-    def mortar_voids(self) -> tuple[MortarVoid, ...]:
-        """Voids of the whole track, as the slab's matrices want them."""
-        return tuple(void.rectangle for void in self.track.mortar_voids)
 
     @cached_property
     def window_length(self) -> float:
@@ -168,7 +161,7 @@ def _members(scenario: Scenario) -> tuple[Scenario, ...]:
 def _check_members(scenario: Scenario) -> None:
     """Check the rules of every train of an ensemble."""
     if scenario.ensemble.seeds and not any(_is_random(train.irregularity) for train in scenario.members):
-        raise InputError("ensemble.seeds: no effect without a random irregularity; leave them out")
+        raise InputError("ensemble.seeds: must be left out where no train has a random irregularity")
     if scenario.irregularity.seed + scenario.ensemble.size > 2**63:
         raise InputError(f"irregularity.seed = {scenario.irregularity.seed}: seeds of all trains must be below 2^63")
     checked: set[str] = set()
@@ -183,8 +176,8 @@ def _check_members(scenario: Scenario) -> None:
 
 
 def _is_random(track: IrregularityParams) -> bool:
-    """Whether the irregularity depends on a seed."""
-    return track.short_wave or (track.file is None and track.spectrum != "none")
+    """Whether a seed makes a difference."""
+    return track.short_wave or track.has_spectrum
 
 
 def _absolute_vary(ensemble: Ensemble, folder: Path | None) -> Ensemble:
@@ -274,13 +267,14 @@ def check_wavelength(scenario: Scenario, step: float) -> None:
     Raises:
         InputError: The shortest wave is passed in fewer than eight steps (MODEL §6).
     """
-    track, shortest = scenario.irregularity, {}
-    if track.spectrum != "none" and track.file is None:
-        shortest["wavelength_min"] = track.wavelength_min
-    if track.short_wave:
-        shortest["short_wave_min"] = track.short_wave_min
+    irregularity = scenario.irregularity
+    shortest = {}
+    if irregularity.has_spectrum:
+        shortest["wavelength_min"] = irregularity.wavelength_min
+    if irregularity.short_wave:
+        shortest["short_wave_min"] = irregularity.short_wave_min
     for key, wavelength in shortest.items():
-        track_irregularity.check_wavelength(f"irregularity.{key}", wavelength, scenario.train.speed.fastest, step)
+        check_step(wavelength, scenario.train.speed.fastest, step, f"irregularity.{key}")
 
 
 def duration(train: Scenario) -> float:

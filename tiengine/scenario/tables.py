@@ -14,7 +14,8 @@ from tiengine.parameters.quantity import Params, Q
 from tiengine.result_files.channels import BODY, IRREGULARITY, WHEEL
 from tiengine.scenario.key_checks import channel_names, check_speed, number_or
 from tiengine.scenario.part import Part
-from tiengine.track.defects import FailedFastenings, MortarDefect
+from tiengine.track.defects import FailedFastenings
+from tiengine.track.mortar import MortarVoid
 from tiengine.vehicle.speed_programme import SpeedProfile
 
 __all__ = ["Contact", "Numerics", "Output", "Track", "Train"]
@@ -93,7 +94,7 @@ class Track(Params):
         tuple[FailedFastenings, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
     mortar_voids: Annotated[
-        tuple[MortarDefect, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
+        tuple[MortarVoid, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
 
 
