@@ -34,13 +34,13 @@ class Explicit:
 
     def first(self) -> None:
         """Forces of the first pass, from rows U_PREDICTED and V_PREDICTED."""
-        train = self.model.given.train
+        train = self.model.ingredients.train
         self.state.view(at.U_PREDICTED, "vehicles")[:, 1 : train.n_dof : 5] = LIFTED
         self._run(("prepare", "rails", "slabs", "trains", "seats", "forces and contact"), 0)
 
     def second(self) -> None:
         """Forces of the second pass, from rows U, V, A; after the first."""
-        train = self.model.given.train
+        train = self.model.ingredients.train
         self.state.view(at.U, "vehicles")[:, 1 : train.n_dof : 5] = LIFTED
         self._run(("factors", "seats", "forces and contact"), 1)
 
@@ -53,7 +53,7 @@ class Explicit:
 
     def on_rails(self, train: int) -> NDArray[np.float64]:
         """Generalised forces of the seats on the rails, shape (2, 5, N): w, theta_y, v, theta_z, theta_x."""
-        n = self.model.given.modes
+        n = self.model.ingredients.modes
         v, l = (
             self.state.view(at.F, name)[train] - self.state.view(at.LINEAR, name)[train]
             for name in ("vertical", "lateral")

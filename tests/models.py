@@ -53,7 +53,7 @@ class Run:
 
     def march(self, steps: int, irregularity: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Advance; returns the wheels' output, shape (steps, W, 2, N_WHEEL)."""
-        X = self.X + self.V * self.model.given.newmark.dt * np.arange(1, steps + 1)
+        X = self.X + self.V * self.model.ingredients.newmark.dt * np.arange(1, steps + 1)
         trains, wheelsets = self.state.iterations.shape
         if irregularity is None:
             irregularity = np.zeros((trains, steps, wheelsets, at.N_IRREGULARITY))

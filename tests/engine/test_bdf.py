@@ -29,7 +29,7 @@ def system() -> tuple[SemiDiscrete, np.ndarray]:
     state = State.at_rest(model)
     equilibrium(model, state, 0.0, SPEED)
     track = make_irregularity(scenario("paper", *SHORT).irregularity, float(model.wheel_s.max()))
-    equations = SemiDiscrete(model, track, SPEED, range(model.given.slots))
+    equations = SemiDiscrete(model, track, SPEED, range(model.ingredients.slots))
     return equations, equations.pack(state)
 
 

@@ -33,7 +33,7 @@ def test_published_deflection(beam: str, modes: int) -> None:
     """Static deflection under 70 kN, all printed digits; the Euler rows with shear made 1e-5 of what it is."""
     model = paper_model(modes=modes)
     if beam == "euler":
-        section = model.given.rail
+        section = model.ingredients.rail
         model = paper_model(modes=modes, rail=section.model_copy(update={"G": 1e5 * section.G}))
     state = State.at_rest(model)
     state.enter(model, 0, 0)
@@ -81,7 +81,7 @@ def test_kernels_balance_the_static_solution(X: float, V: float, overrides: tupl
     rng = np.random.default_rng(5)
     force = rng.standard_normal((4, 2, 3)) * [70e3, 20e3, 2e3]
     rails, slabs = track.motion(force)
-    n = model.given.modes
+    n = model.ingredients.modes
     state.view(at.U, "vertical")[0] = rails[:, : 2 * n]
     state.view(at.U, "lateral")[0] = rails[:, 2 * n :]
     state.view(at.U, "slabs")[0] = slabs

@@ -38,7 +38,7 @@ def test_positions_count_every_seat_and_slab(model: Model) -> None:
     assert np.all(X < (p.first_slab + 1) * PITCH + 1e-6)
     # seats belong to slabs: 9 j .. 9 j + 8; all of the window's are among the slots
     last = (p.first_seat + inside - 1) // 9
-    assert np.all(last - p.first_slab < model.given.slots)
+    assert np.all(last - p.first_slab < model.ingredients.slots)
     assert np.all(p.first_seat // 9 - p.first_slab >= 0)
     np.testing.assert_array_equal(p.clock[:, at.SPEED_RATE], -1.0)
 
@@ -48,7 +48,7 @@ def test_slabs_keep_their_state() -> None:
     void = "track.mortar_voids=[{slab=9, x=[1.0, 1.65], y=[-1.25, 1.25]}, {slab=4, x=[0.5, 1.0], y=[-1.0, 1.0]}]"
     model = paper_model(void)
     state = State.at_rest(model)
-    slots = model.given.slots
+    slots = model.ingredients.slots
     rng = np.random.default_rng(2)
     memory: dict[int, np.ndarray] = {}
     state.enter(model, 0, 0)
@@ -102,8 +102,8 @@ def test_count_of_slabs_hardly_matters() -> None:
         )
         forces.append(run.march(1000, track)[..., [at.VERTICAL_FORCE, at.LATERAL_FORCE]])
     full, paper = forces
-    assert paper_model(cover=False).given.slots == 7
-    assert paper_model(cover=True).given.slots == 8
+    assert paper_model(cover=False).ingredients.slots == 7
+    assert paper_model(cover=True).ingredients.slots == 8
     peak = np.abs(full).max(axis=(0, 1, 2))
     difference = np.abs(full - paper).max(axis=(0, 1, 2))
     assert np.all(difference < 1e-4 * peak), difference / peak

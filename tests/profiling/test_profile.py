@@ -108,7 +108,7 @@ def test_measuring_changes_no_bit():
     model = paper_model()
     watched, bare = (Run(model, V350, steps=20) for _ in range(2))
     bare.march(20)
-    X = V350 * model.given.newmark.dt * np.arange(1, 21)
+    X = V350 * model.ingredients.newmark.dt * np.arange(1, 21)
     watched.stepper.load(X, np.full(20, V350), np.zeros(20), np.zeros_like(watched.chunk.irregularity))
     timers = StageTimers(watched.stepper)
     timers.run([(i, i, i) for i in range(20)], Times(timers.calls))
@@ -150,7 +150,7 @@ def test_counted_solve_is_the_blocks_by_hand():
         stepper.load(np.ones(1), np.full(1, V350), np.zeros(1), np.zeros_like(run.chunk.irregularity))
 
     flops = count_products(model, run.state, run.chunk, load)["solve"].flops
-    n, slots, dofs = model.given.train.n, int(model.dims[at.SLOTS]), int(model.dims[at.SLAB_DOFS])
+    n, slots, dofs = model.ingredients.train.n, int(model.dims[at.SLOTS]), int(model.dims[at.SLAB_DOFS])
     slabs, odd = divmod(flops - 3 * 2 * (2 * 40**2 + 2 * 60**2 + n**2), 3 * 2 * slots * dofs)
     assert odd == 0
     assert 0 < slabs <= dofs  # length of the slabs' sums

@@ -30,7 +30,7 @@ def test_envelopes_are_the_extremes_of_every_step(zone):
     envelopes = SeatEnvelopes.of(stepper)
     seen: dict[int, list[NDArray[np.float64]]] = defaultdict(list)
     first, end = watched_seats(run.model)
-    length, d = run.model.given.length, run.model.given.slab.fastening_pitch
+    length, d = run.model.ingredients.length, run.model.ingredients.slab.fastening_pitch
 
     def look() -> None:
         s = stepper.chunk.clock[stepper.asked[0], at.FIRST_SEAT_S] + np.arange(state.seat_force.shape[-1]) * d
@@ -64,7 +64,7 @@ def test_after_one_step_the_seats_carry_the_train():
     run.stepper.stages = (*run.stepper.stages, ("envelopes", envelopes.watch))
     run.march(1)
     channels = envelopes.rest()[0].channels
-    train = run.model.given.train
+    train = run.model.ingredients.train
     weight = train.gravity[1 : train.n_dof : 5].sum()
     np.testing.assert_array_equal(channels["largest_vertical_force"], channels["smallest_vertical_force"])
     assert channels["largest_vertical_force"].sum() == pytest.approx(weight, rel=1e-4)
@@ -78,9 +78,13 @@ def test_slabs_against_their_coordinates(mortar):
     """Deflection at nodes and seats, moments and pressures of every sample of the bodies."""
     run = Run(paper_model(f'numerics.mortar="{mortar}"', dt=DT), V350, steps=500)
     scenario = load_scenario("paper")
-    stepper, slab = run.stepper, run.model.given.slab
+    stepper, slab = run.stepper, run.model.ingredients.slab
     envelopes = SlabEnvelopes.of(scenario, stepper)
-    operator, slots, sound = moment_operator(slab), run.model.given.slots, run.model.given.designs.matrices[0]
+    operator, slots, sound = (
+        moment_operator(slab),
+        run.model.ingredients.slots,
+        run.model.ingredients.designs.matrices[0],
+    )
     seen: dict[int, list[tuple[float, ...]]] = defaultdict(list)
     held: list[int] = []
 

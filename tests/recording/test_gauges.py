@@ -104,7 +104,7 @@ def test_a_place_of_the_rail_moves_with_the_material():
 
 def test_a_rail_place_is_read_inside_the_window_only():
     model = paper_model()
-    state, length = State.at_rest(model), model.given.length
+    state, length = State.at_rest(model), model.ingredients.length
     place = RailPlace(model, state, 40.0, 0)
     assert place.read(40.0 - length - 1e-6, 90.0, 0.0) is None
     assert place.read(40.0 - length + 1e-6, 90.0, 0.0) is not None
@@ -115,7 +115,7 @@ def test_a_rail_place_is_read_inside_the_window_only():
 def test_a_place_of_a_slab_moves_with_its_plate_and_its_rigid_motion():
     """A plane w = 1 + 2 x + 3 y is in the element's shapes; laterally y + psi x, x from the slab's centre."""
     model = paper_model()
-    slab, state = model.given.slab, State.at_rest(model)
+    slab, state = model.ingredients.slab, State.at_rest(model)
     state.first_slab = 3
     x, y = 1.1, -0.4
     chainage = 4.5 * slab.pitch + x  # on slab 4
@@ -127,7 +127,7 @@ def test_a_place_of_a_slab_moves_with_its_plate_and_its_rigid_motion():
     w = 1.0 + 2.0 * nodes[0] + 3.0 * nodes[1]
     plane = np.stack([w, np.full_like(w, 2.0), np.full_like(w, 3.0)], axis=-1).ravel()
     for row, factor in ((at.U, 1.0), (at.V, 10.0), (at.A, 100.0)):
-        state.view(row, "slabs")[0, 4 % model.given.slots] = factor * np.append(plane, [0.5, 0.25])
+        state.view(row, "slabs")[0, 4 % model.ingredients.slots] = factor * np.append(plane, [0.5, 0.25])
     place = SlabPlace(model, state, chainage, y)
     found = place.read(chainage - 10.0, 90.0, 0.0)
     assert found is not None

@@ -113,7 +113,7 @@ def test_a_flight_that_ends_in_time_is_no_event(guard: Guard):
 
 def test_climbing_and_derailing(guard: Guard):
     """The flange first, the end of the profile next; the latter ends the train."""
-    climb = climbing_shift(guard.model.given.contact)
+    climb = climbing_shift(guard.model.ingredients.contact)
     assert 11.5e-3 < climb < 12.5e-3  # LMA on CHN60: the flank of 70 degrees ends at 12.1 mm (contact table)
     guard.state.contact[0, 1, 0, SHIFT] = climb + 1e-4
     guard.look(5, 10.0)
@@ -141,7 +141,7 @@ def test_the_scenario_decides(guard: Guard):
 
 def test_the_end_of_a_measured_track(guard: Guard):
     """Noted once, when the leading wheel comes to it, 11.25 m ahead of the centre."""
-    front = float(guard.model.given.train.wheelset_x.max())
+    front = float(guard.model.ingredients.train.wheelset_x.max())
     guard = guard_of(Events(), track_end=50.0)
     guard.look(5, 50.0 - front - 0.01)
     assert guard.take() == {}

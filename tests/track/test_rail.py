@@ -177,7 +177,7 @@ def test_step_against_host() -> None:
     Rails: the force. Slabs and trains: the acceleration, that is after the implicit operator.
     """
     model = paper_model(modes=24, trains=2)
-    state, g = State.at_rest(model), model.given
+    state, g = State.at_rest(model), model.ingredients
     clock = positions(model, np.array([33.3]), np.array([V350]), np.array([V_RATE])).clock
     state.enter(model, int(clock[0, at.FIRST_SEAT]), int(clock[0, at.FIRST_SLAB]))
     rng = np.random.default_rng(3)

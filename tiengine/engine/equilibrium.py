@@ -73,7 +73,7 @@ def evaluate_contact(
         V,
         int(model.dims[at.CROSS_LEVEL_ROLLS]),
         model.constants,
-        model.given.contact.values,
+        model.ingredients.contact.values,
         model.wheel,
         np.ascontiguousarray(np.broadcast_to(irregularity, (B, W, at.N_IRREGULARITY))),
         np.ascontiguousarray(wheelset_u),
@@ -128,9 +128,9 @@ def release(model: Model, state: State, X: float) -> None:
     """
     clock = positions(model, np.array([X]), np.zeros(1), np.zeros(1)).clock[0]
     state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
-    n = model.given.train.n_dof
-    mass = np.diag(model.given.train.M)
-    state.view(at.A, "vehicles")[:, :n] = model.given.train.gravity[:n] / mass[:n]
+    n = model.ingredients.train.n_dof
+    mass = np.diag(model.ingredients.train.M)
+    state.view(at.A, "vehicles")[:, :n] = model.ingredients.train.gravity[:n] / mass[:n]
 
 
 class _Problem:
@@ -138,7 +138,7 @@ class _Problem:
 
     def __init__(self, model: Model, track: StaticTrack, V: float, V_rate: float) -> None:
         self.model, self.track, self.V = model, track, V
-        self.train = model.given.train
+        self.train = model.ingredients.train
         self.pitch = self.train.wheelset_dof[:, 3]
         self.load = self.train.gravity + V_rate * self.train.acceleration_force
 
@@ -200,7 +200,7 @@ class _Problem:
         """Vertical equilibrium on linearised contact springs, the track held."""
         train, dof = self.train, self.train.wheelset_dof
         load = float(self.model.constants[at.STATIC_LOAD])
-        centre = self.model.given.contact.lookup(np.array(0.0), np.array(0.0))
+        centre = self.model.ingredients.contact.lookup(np.array(0.0), np.array(0.0))
         approach = (load / centre[at.HERTZ]) ** (2.0 / 3.0)
         stiffness = 1.5 * load / approach
         K = train.K.copy()

@@ -38,14 +38,14 @@ def energy_growth(model: Model, V: float) -> float:
     state = State.at_rest(model)
     chunk = Chunk.empty(model, STEPS, 1, 1)
     stepper = Stepper(model, state, chunk)
-    X = np.arange(1.0, STEPS + 1.0) * (V * model.given.newmark.dt)
+    X = np.arange(1.0, STEPS + 1.0) * (V * model.ingredients.newmark.dt)
     stepper.load(X, np.full(STEPS, V), np.zeros(STEPS), np.zeros_like(chunk.irregularity))
     random = np.random.Generator(np.random.Philox(key=0))
     state.enter(model, int(chunk.clock[0, at.FIRST_SEAT]), int(chunk.clock[0, at.FIRST_SLAB]))
     for block in ("vertical", "lateral", "slabs"):
         velocity = state.view(at.V, block)
         velocity[:] = 1e-3 * random.standard_normal(velocity.shape)
-    train = model.given.train
+    train = model.ingredients.train
     state.view(at.U, "vehicles")[:, 1 : train.n_dof : 5] = LIFTED
     energies = np.empty(STEPS)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -64,7 +64,7 @@ def is_stable(model: Model, V: float) -> bool:
 
 def _energy(model: Model, state: State) -> float:
     """Kinetic and elastic energy of rails and slabs [J], the rails' by their decoupled fields."""
-    s, mass, n = model.stiffness, model.window.modal_masses, model.given.modes
+    s, mass, n = model.stiffness, model.window.modal_masses, model.ingredients.modes
     vertical, lateral = (_split(state, name, n) for name in ("vertical", "lateral"))
     total = 0.0
     for (u, v), masses, k in (
@@ -76,7 +76,7 @@ def _energy(model: Model, state: State) -> float:
             np.sum(k[0] * u[..., 0, :] ** 2 + 2 * k[1] * u[..., 0, :] * u[..., 1, :] + k[2] * u[..., 1, :] ** 2)
         )
     total += float(np.sum(s[:, 6] * lateral[0][..., 2, :] ** 2))
-    slab = model.given.designs.matrices[0]
+    slab = model.ingredients.designs.matrices[0]
     u, v = state.view(at.U, "slabs"), state.view(at.V, "slabs")
     total += float(np.sum(v * (v @ slab.M)) + np.sum(u * (u @ (slab.K_plate + slab.K_bed))))
     return 0.5 * total

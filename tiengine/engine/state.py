@@ -98,14 +98,14 @@ class State:
             first_slab: Index of the rear slab.
         """
         if first_seat != self.first_seat:
-            self.seat_scale[:] = model.given.seat_factors(first_seat, self.seat_scale.shape[1])
+            self.seat_scale[:] = model.ingredients.seat_factors(first_seat, self.seat_scale.shape[1])
             self.first_seat = first_seat
         if first_slab != self.first_slab:
             slots = self.design.shape[1]
             fresh = range(max(first_slab, self.first_slab + slots), first_slab + slots)
             for slab in fresh if self.first_slab >= 0 else range(first_slab, first_slab + slots):
                 slot = slab % slots
-                self.design[:, slot] = model.given.designs.of_slab.get(slab, 0)
+                self.design[:, slot] = model.ingredients.designs.of_slab.get(slab, 0)
                 for row in (at.U, at.V, at.A):
                     self.view(row, "slabs")[:, slot] = 0.0
             self.first_slab = first_slab
@@ -151,7 +151,7 @@ def positions(model: Model, X: NDArray[np.float64], V: NDArray[np.float64], V_ra
         V: Speed [m/s].
         V_rate: Its rate [m/s^2].
     """
-    d, p = model.given.slab.fastening_pitch, model.given.slab.pitch
+    d, p = model.ingredients.slab.fastening_pitch, model.ingredients.slab.pitch
     clock = np.zeros((len(X), at.N_CLOCK))
     first = np.maximum(np.floor(X / d - 0.5).astype(np.int64) + 1, 0)
     clock[:, at.POSITION], clock[:, at.SPEED], clock[:, at.SPEED_RATE] = X, V, V_rate

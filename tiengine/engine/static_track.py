@@ -33,16 +33,16 @@ class StaticTrack:
             train: Which train's track.
         """
         self.model, self.V = model, V
-        n = model.given.modes
+        n = model.ingredients.modes
         rail = la.block_diag(model.window.vertical(V)[2].toarray(), model.window.lateral(V)[2].toarray())
         K = la.block_diag(rail, rail)
         self._slabs: list[tuple[int, tuple[NDArray[np.float64], NDArray[np.int32]], NDArray[np.float64]]] = []
-        slots = model.given.slots
+        slots = model.ingredients.slots
         for slab, springs in self._springs(state, first_seat_s, train).items():
             K += springs.test.T @ springs.pull
             if slab >= state.first_slab + slots:
                 continue  # beyond the modelled slabs the ground is rigid
-            design = model.given.designs.matrices[state.design[train, slab % slots]]
+            design = model.ingredients.designs.matrices[state.design[train, slab % slots]]
             own = springs.slab.T @ (springs.stiffness[:, None] * springs.slab)
             to_slab = -springs.slab.T @ springs.pull
             to_rail = -springs.test.T @ (springs.stiffness[:, None] * springs.slab)
@@ -95,14 +95,14 @@ class StaticTrack:
     def respond(self, load: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """As :meth:`motion`, under generalised forces on the rails' coordinates, shape (10 N,)."""
         q = la.lu_solve(self._lu, load)
-        slabs = np.zeros((self.model.given.slots, int(self.model.dims[at.SLAB_DOFS])))
+        slabs = np.zeros((self.model.ingredients.slots, int(self.model.dims[at.SLAB_DOFS])))
         for slot, lu, to_slab in self._slabs:
             slabs[slot] = -la.lu_solve(lu, to_slab @ q)
         return q.reshape(2, -1), slabs
 
     def _springs(self, state: State, s0: float, train: int) -> dict[int, _Springs]:
         """Springs of the seats in the window, by slab."""
-        g = self.model.given
+        g = self.model.ingredients
         d, per_slab = g.slab.fastening_pitch, g.slab.fastenings
         j = np.arange(state.seat_scale.shape[1])
         s = np.asarray(s0 + j * d, dtype=np.float64)
@@ -144,8 +144,8 @@ def _slab_springs(
         phi: Rail shape at the seats, shape (k, N).
         rate: Its convective rate -V d/ds, shape (k, N).
     """
-    fastening, r, n = model.given.fastening, model.given.rail, model.given.modes
-    a, b, design = r.arm_fastening, r.half_base, model.given.designs.matrices[0]
+    fastening, r, n = model.ingredients.fastening, model.ingredients.rail, model.ingredients.modes
+    a, b, design = r.arm_fastening, r.half_base, model.ingredients.designs.matrices[0]
     kinds = (  # arms on w, v, theta_x; stiffness, damping
         ((1.0, 0.0, 0.0), fastening.vertical_stiffness, fastening.vertical_damping),
         ((0.0, 0.0, b), fastening.vertical_stiffness, fastening.vertical_damping),

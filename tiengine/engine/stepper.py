@@ -85,8 +85,8 @@ class Stepper:
         """
         self.model, self.state, self.chunk = model, state, chunk
         self.scratch = Scratch.of(model)
-        self._tick = np.zeros((model.given.passes, at.N_TICK), dtype=np.int32)
-        self._tick[:, at.PASS] = np.arange(model.given.passes)
+        self._tick = np.zeros((model.ingredients.passes, at.N_TICK), dtype=np.int32)
+        self._tick[:, at.PASS] = np.arange(model.ingredients.passes)
         self._tick[-1, at.LAST_PASS] = 1
         self._launches: list[Launch] = []
         self._parallel, self._public = parallel, public
@@ -107,7 +107,7 @@ class Stepper:
     def _stages(self) -> Iterator[tuple[str, Callable[[], object]]]:
         """The step: see :mod:`tiengine.kernels.step`."""
         m, k, blocks, motion = self.model, self.scratch, self.model.blocks, self.state.motion
-        newmark = m.given.newmark
+        newmark = m.ingredients.newmark
         F, a = ({block: self._flat(row, block) for block in _BLOCKS} for row in (at.F, at.A))
         own = slice(int(m.dims[at.SLABS]), None)  # columns of slabs and trains
         rails, slabs, forces = _rows(k.rail_factor), _rows(k.slab_factor), k.slab_force.reshape(len(a["slabs"]), -1)
@@ -163,12 +163,12 @@ class Stepper:
         )
 
     def _bind_forces(self, tick: NDArray[np.int32], rows: NDArray[np.int32]) -> Launch:
-        m, s, k, b, train = self.model, self.state, self.scratch, self.model.blocks, self.model.given.train
+        m, s, k, b, train = self.model, self.state, self.scratch, self.model.blocks, self.model.ingredients.train
         return self._launch(
             kernels.forces_and_contact, tick, rows, m.dims, m.constants, self.chunk.clock, m.stiffness, k.drift,
             s.seat_scale, k.seat_shape, k.rail_pull, k.slab_pull, m.vehicle_load, train.wheelset_dof, m.wheel,
             train.element_index, train.element_row, train.element_kind, train.element_linear, train.element_table,
-            m.given.contact.values, self.chunk.irregularity, m.wheel_shape, b.wheelset_compliance, b.rail_coupling,
+            m.ingredients.contact.values, self.chunk.irregularity, m.wheel_shape, b.wheelset_compliance, b.rail_coupling,
             b.rail_answer, b.vehicle_answer, s.motion, s.seat_force, k.slab_force, k.rail_predicted, s.contact, s.force,
             s.wheelset_force, s.rail_force, s.iterations, self.chunk.wheel,
         )  # fmt: skip

@@ -136,7 +136,7 @@ def _measure(loop: TimedLoop, wall: Wall, steps: int) -> ProfileReport:
         scenario=loop.scenario.name,
         trains=trains,
         time_step_s=dt,
-        passes=model.given.passes,
+        passes=model.ingredients.passes,
         dofs=model.dof_counts["total"],
         warm_up_steps=warm_up,
         steps=steps,
@@ -164,7 +164,7 @@ def _measure(loop: TimedLoop, wall: Wall, steps: int) -> ProfileReport:
 def _parts(loop: TimedLoop) -> dict[str, tuple[float, float]]:
     """Calls a step and time [us a train-step] of parts that share a stage with others."""
     model, state = loop.stepper.model, loop.stepper.state
-    passes = model.given.passes
+    passes = model.ingredients.passes
     return {
         "suspension": (passes, passes * suspension_us(model, state)),
         "contact": (passes, passes * contact_us(loop.stepper)),

@@ -46,7 +46,7 @@ def contact_us(stepper: Stepper) -> float:
 
 def suspension_us(model: Model, state: State) -> float:
     """One evaluation of one train's nonlinear elements [us]."""
-    train = model.given.train
+    train = model.ingredients.train
     motion = np.stack([state.view(row, "vehicles")[0] for row in (at.U, at.V, at.F)])
 
     def evaluate(trains: int) -> Callable[[], object]:

@@ -180,7 +180,7 @@ class TimedLoop:
                 " profile fewer seconds or lengthen the way"
             )
         lap("window and seats")
-        wheels = x[:, None] + model.given.train.wheelset_x
+        wheels = x[:, None] + model.ingredients.train.wheelset_x
         felt = np.stack([each.sample(wheels) for each in self.irregularities])
         lap("irregularity")
         self.stepper.load(x - model.centre_s, V, V_rate, felt)

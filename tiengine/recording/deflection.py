@@ -42,8 +42,8 @@ class Deflection:
     def __post_init__(self) -> None:
         """Shapes of the rails at the points, and of the slabs under them as polynomials of x."""
         model = self.stepper.model
-        slab = model.given.slab
-        self._points = window_points(model.given.length)
+        slab = model.ingredients.slab
+        self._points = window_points(model.ingredients.length)
         self._rail_shape = model.window.shape(self._points).T
         self._slab_dofs = element_dofs(slab).reshape(slab.elements_x, slab.elements_y, 12)
         self._under_rails = [_cubic_along(slab, side * slab.seat_half_spacing) for side in (-1.0, 1.0)]
@@ -88,12 +88,12 @@ class Deflection:
 
     def _rail(self) -> Reals:
         """Deflection of the rails [m], shape (B, 2, points)."""
-        rails = self.stepper.state.view(at.U, "vertical")[..., : self.stepper.model.given.modes]
+        rails = self.stepper.state.view(at.U, "vertical")[..., : self.stepper.model.ingredients.modes]
         return np.asarray(rails @ self._rail_shape)
 
     def _slab(self) -> Reals:
         """Deflection of the slabs under the rails [m], shape (B, 2, points); NaN where there is none."""
-        state, slab = self.stepper.state, self.stepper.model.given.slab
+        state, slab = self.stepper.state, self.stepper.model.ingredients.slab
         chainage = self.stepper.chunk.clock[self.stepper.asked[0], at.POSITION] + self._points
         number = np.floor(chainage / slab.pitch).astype(np.int64)
         x = chainage - (number + 0.5) * slab.pitch

@@ -63,7 +63,7 @@ class RailPlace:
 
     def __post_init__(self) -> None:
         """Views of v and w: displacement, rate, second rate, each (B, N)."""
-        n = self.model.given.modes
+        n = self.model.ingredients.modes
         self._fields = [
             [self.state.view(row, block)[:, self.side, :n] for row in ROWS] for block in ("lateral", "vertical")
         ]
@@ -72,7 +72,7 @@ class RailPlace:
     def read(self, X: float, V: float, V_rate: float) -> Reals | None:
         """Displacement, velocity, acceleration to the right and down, shape (3, B, 2)."""
         s = self.chainage - X
-        if not 0.0 <= s <= self.model.given.length:
+        if not 0.0 <= s <= self.model.ingredients.length:
             return None
         sine, cosine = np.sin(self._k * s), np.cos(self._k * s)
         shapes = np.stack([sine, self._k * cosine, -(self._k**2) * sine], axis=1)
@@ -102,18 +102,18 @@ class SlabPlace:
 
     def __post_init__(self) -> None:
         """Shapes at the place."""
-        slab = self.model.given.slab
+        slab = self.model.ingredients.slab
         self._slab, self._x = slab_under(self.chainage, slab)
         index, table = shapes_at(slab, np.array([self._x]), np.array([self.y]))
         self._index, self._shape = index[0], table[0, W]
-        slot = self._slab % self.model.given.slots
+        slot = self._slab % self.model.ingredients.slots
         self._motion = [self.state.view(row, "slabs")[:, slot] for row in ROWS]
 
     def read(self, X: float, V: float, V_rate: float) -> Reals | None:
         """Displacement, velocity, acceleration to the right and down, shape (3, B, 2)."""
         first = self.state.first_slab
-        inside = 0.0 <= self.chainage - X <= self.model.given.length
-        if not (inside and first <= self._slab < first + self.model.given.slots):
+        inside = 0.0 <= self.chainage - X <= self.model.ingredients.length
+        if not (inside and first <= self._slab < first + self.model.ingredients.slots):
             return None
         found = np.empty((3, len(self.state.design), 2))
         for kind, motion in enumerate(self._motion):
@@ -212,7 +212,7 @@ def gauge_samples(gauge: Gauge, stepper: Stepper) -> GaugeSamples:
     model, state = stepper.model, stepper.state
     trains = len(state.design)
     if gauge.on == "fastening":
-        seat = nearest_seat(gauge.chainage, model.given.slab)
+        seat = nearest_seat(gauge.chainage, model.ingredients.slab)
         place: Place = SeatPlace(state, seat, SIDES[gauge.side or "left"], watched_seats(model))
         return GaugeSamples(stepper, place, tuple(GAUGE_FORCE), np.empty((0, 2, trains)))
     if gauge.on == "rail":

@@ -95,12 +95,12 @@ class Guard:
         self.model, self.state = self.stepper.model, self.stepper.state
         self._done, self._position = 0, np.zeros(0)
         self._flying = True  # as far as is known: a checkpoint may have brought wheels in flight
-        self.every = max(int(EVERY / self.model.given.newmark.dt + 1e-9), 1)
+        self.every = max(int(EVERY / self.model.ingredients.newmark.dt + 1e-9), 1)
         self._rows = [(self.state.motion[row], limit * limit) for row, limit in LIMITS.items()]
         self._shift, self._normal = self.state.contact[..., SHIFT], self.state.force[..., 0]
-        table = self.model.given.contact
+        table = self.model.ingredients.contact
         self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
-        self._wheel_front = float(self.model.given.train.wheelset_x.max())
+        self._wheel_front = float(self.model.ingredients.train.wheelset_x.max())
         self._nearest_end = float(self.track_end.min())
 
     def load(self, done: int, position: NDArray[np.float64]) -> None:
@@ -126,7 +126,7 @@ class Guard:
             step: Its number, from 1.
             position: Chainage of the first vehicle's centre [m].
         """
-        time = step * self.model.given.newmark.dt
+        time = step * self.model.ingredients.newmark.dt
         if not all(float(np.dot(row, row)) < limit for row, limit in self._rows):  # not a number is not less, either
             self._runaway(step, time, position)
         if not self._normal.min() > 0.0:
@@ -141,7 +141,7 @@ class Guard:
     def _lifts(self, step: int, time: float, position: float) -> None:
         """Wheels that carry nothing, for how long."""
         lifted, self._flying = self.watch.lifted, True
-        lifted += self.every * self.model.given.newmark.dt
+        lifted += self.every * self.model.ingredients.newmark.dt
         lifted[self._normal > 0.0] = 0.0
         lasting = lifted >= self.policy.wheel_lift_time
         self._wheels(2, lasting, step, time, position, f"off the rail for {self.policy.wheel_lift_time:g} s")
@@ -192,7 +192,7 @@ class Guard:
                 continue
             first = [words for excess, words in found if excess == worst]  # several, once all are not-a-numbers
             what = first[0] if len(first) == 1 else f"one of {', '.join(first)}"
-            shorter = 0.5 * self.model.given.newmark.dt
+            shorter = 0.5 * self.model.ingredients.newmark.dt
             words = (
                 f"numbers ran away, first of {what}; try numerics.time_step = {shorter:g}, more passes, or look at the"
                 " irregularity there"
@@ -217,7 +217,7 @@ class Guard:
             slots, rear = self.state.design.shape[1], self.state.first_slab
             return f"slab {rear + (place[0] - rear) % slots}"
         if block == "vehicles":
-            bodies = self.model.given.train.body_names
+            bodies = self.model.ingredients.train.body_names
             body, dof = divmod(place[0], len(DOFS))
             return f"body {bodies[body]} ({DOFS[dof]})" if body < len(bodies) else "a damper in series with its spring"
         return f"the {SIDES[place[0]]} rail, {block}ly"

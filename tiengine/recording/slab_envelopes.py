@@ -163,7 +163,7 @@ class SlabEnvelopes:
 
     def _taken(self) -> list[Block]:
         """What was put aside."""
-        slab = self.stepper.model.given.slab
+        slab = self.stepper.model.ingredients.slab
         slabs, largest, smallest = self.shape.take()
         _, *pressure = self.pressure.take()
         names = ("pressure", "deflection", "moment_x", "moment_y")
@@ -188,7 +188,7 @@ def _measures(model: Model) -> tuple[Reals, tuple[int, int, int]]:
 
     The deflection is taken at the nodes and under the fastenings: of a coarse mesh no node may be near these.
     """
-    slab, seats = model.given.slab, 2 * model.given.slab.fastenings
+    slab, seats = model.ingredients.slab, 2 * model.ingredients.slab.fastenings
     moments = moment_operator(slab)
     nodes = np.eye(len(moments))[:, : slab.plate_dofs : 3]
     places = np.hstack([nodes, model.slab_seats[:, :seats]])

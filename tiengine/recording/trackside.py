@@ -161,5 +161,5 @@ def _watchers(scenario: Scenario, stepper: Stepper) -> Iterator[tuple[str, Watch
     for gauge in scenario.gauges:
         yield f"gauges/{gauge.name}", gauge_samples(gauge, stepper)
     if out.deflection_interval != "none":
-        every = max(1, round(float(out.deflection_interval) / stepper.model.given.newmark.dt))
+        every = max(1, round(float(out.deflection_interval) / stepper.model.ingredients.newmark.dt))
         yield "deflection", Deflection(stepper, every)

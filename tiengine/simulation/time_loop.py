@@ -130,7 +130,7 @@ class Run:
         """
         scenario = task.scenario
         model, jit = prepare(scenario, public, task.size)
-        recorder = Recorder(scenario, model.given.newmark.dt)
+        recorder = Recorder(scenario, model.ingredients.newmark.dt)
         state = State.at_rest(model) if saved else _started(scenario, model)
         rows = (CHUNK_STEPS // every + 1 for every in (recorder.wheel_every, recorder.body_every))
         chunk = Chunk.empty(model, CHUNK_STEPS, *rows)
@@ -141,7 +141,7 @@ class Run:
         lead = scenario.rear + float(model.wheel_s.max())
         tracks = [make_irregularity(track, lead) for track in task.tracks]
         start = scenario.rear + model.centre_s
-        check_reach(tracks, start + scenario.train.distance + float(model.given.train.wheelset_x.max()))
+        check_reach(tracks, start + scenario.train.distance + float(model.ingredients.train.wheelset_x.max()))
         guard = Guard.beside(stepper, scenario.events, np.array([track.end for track in tracks]))
         places = list(range(len(task.trains)))
         steps = np.zeros(len(places), np.int64)
@@ -153,7 +153,7 @@ class Run:
     @property
     def labels(self) -> TrainLabels:
         """Labels of each train."""
-        labels = self.recorder.labels(self.model.given.train, self.model.given.slots)
+        labels = self.recorder.labels(self.model.ingredients.train, self.model.ingredients.slots)
         return replace(labels, point_offset=self.trackside.point_offset)
 
     @property
@@ -169,7 +169,7 @@ class Run:
 
     def blocks(self) -> Iterator[Advanced]:
         """Advance by a chunk of steps at a time to the end of the way, or until no train is left."""
-        train, dt = self.task.scenario.train, self.model.given.newmark.dt
+        train, dt = self.task.scenario.train, self.model.ingredients.newmark.dt
         while self.on_its_way:
             x, V, V_rate = train.speed.advance(self.position, dt, CHUNK_STEPS)
             count = min(int(np.searchsorted(x, self._end - 1e-9)), CHUNK_STEPS)
@@ -183,7 +183,7 @@ class Run:
     def _advance(self, x: NDArray[np.float64], V: NDArray[np.float64], V_rate: NDArray[np.float64]) -> Advanced:
         """The coming steps; the first vehicle's centre ends each of them at chainage x [m]."""
         recorder, chunk, trains, done = self.recorder, self.stepper.chunk, self.task.trains, self.done
-        wheels = x[:, None] + self.model.given.train.wheelset_x
+        wheels = x[:, None] + self.model.ingredients.train.wheelset_x
         felt = np.stack([track.sample(wheels) for track in self.tracks])
         self.stepper.load(x - self.model.centre_s, V, V_rate, felt)
         self.guard.load(done, x)
@@ -285,7 +285,7 @@ def _started(scenario: Scenario, model: Model) -> State:
 
 def _facts(task: Task, model: Model) -> dict[int, dict[str, Any]]:
     """What is known of each train from the beginning."""
-    given = model.given
+    given = model.ingredients
     shared = {
         **{f"dofs_{name}": count for name, count in model.dof_counts.items() if name != "total"},
         "dofs": model.dof_counts["total"],

@@ -45,7 +45,7 @@ def _reference() -> NDArray[np.float64]:
     state = State.at_rest(model)
     equilibrium(model, state, 0.0, V)
     track = make_irregularity(scenario.irregularity, float(model.wheel_s.max()))
-    equations = SemiDiscrete(model, track, V, range(model.given.slots))
+    equations = SemiDiscrete(model, track, V, range(model.ingredients.slots))
     times = np.arange(1, round(DURATION / SAMPLE) + 1) * SAMPLE
     found = solve_ivp(
         equations.rhs,

@@ -34,7 +34,7 @@ def _last(values: Reals) -> Reals:
 
 def _static() -> Reals:
     """Static load of the eight wheels [N], shape (8,)."""
-    return static_wheel_loads(paper_model().given.train).ravel()
+    return static_wheel_loads(paper_model().ingredients.train).ravel()
 
 
 def _passing_share() -> float:

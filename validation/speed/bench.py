@@ -95,7 +95,7 @@ class Bench:
         """Irregularity of the coming steps, and chainage of the window's rear end [m]."""
         X = self.scenario.rear + self.V * self.recorder.dt * np.arange(self.done + 1.0, self.done + steps + 1.0)
         model = self.stepper.model
-        wheels = (X + model.centre_s)[:, None] + model.given.train.wheelset_x
+        wheels = (X + model.centre_s)[:, None] + model.ingredients.train.wheelset_x
         return np.stack([track.sample(wheels) for track in self.tracks]), X
 
 
