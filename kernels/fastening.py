@@ -144,13 +144,7 @@ def seat_forces(
 def rail_forces(b: int, iterate: int, dims: Array, constants: Array, shape: Array, force: Array, motion: Array):
     """F of the rails: linear forces, seats by row-dot products, and what A_s holds of the seats at the iterate."""
     n, seats, lateral = dims[at.MODES], dims[at.SEATS], dims[at.LATERAL]
-    per_mode = constants[at.SMEARING] * constants[at.LENGTH] / (2.0 * constants[at.SPACING])
-    kv = per_mode * (
-        constants[at.BETA_DT2] * constants[at.K_VERTICAL] + constants[at.GAMMA_DT] * constants[at.C_VERTICAL]
-    )
-    kl = per_mode * (
-        constants[at.BETA_DT2] * constants[at.K_LATERAL] + constants[at.GAMMA_DT] * constants[at.C_LATERAL]
-    )
+    kv, kl = constants[at.SMEARED_VERTICAL], constants[at.SMEARED_LATERAL]
     a, base2 = constants[at.ARM_FASTENING], constants[at.HALF_BASE] * constants[at.HALF_BASE]
     for rail in range(2):
         for i in range(n):

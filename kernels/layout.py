@@ -59,13 +59,14 @@ MOTION_ROWS = 7
     TABLE_DU,
     TABLE_ALPHA0,
     TABLE_DALPHA,
-    SMEARING,  # factor on the smeared fastenings of the implicit rail blocks
+    SMEARED_VERTICAL,  # A_s: smeared fastenings of the implicit rail blocks, by mode [kg]
+    SMEARED_LATERAL,
     RESIDUAL_VERTICAL,  # compliance of the modes left out, under a wheel, in w, v, theta_x; zero if not wanted
     RESIDUAL_LATERAL,
     RESIDUAL_TORSION,
     ABSORBING_ZONE,  # length of the zones at the window's ends with more fastening, to the ground [m]
     N_CONSTANTS,
-) = range(31)
+) = range(32)
 
 # Columns of ``clock[step, :]`` (float64): the window at t_{n+1}.
 (POSITION, SPEED, SPEED_RATE, FIRST_SEAT_S, FIRST_SEAT, FIRST_SLAB, N_CLOCK) = range(7)

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.chunk import Chunk
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 
@@ -23,13 +24,13 @@ class Explicit:
     """
 
     def __init__(
-        self, model: Model, state: State, clock: NDArray[np.float64], constants: NDArray[np.float64] | None = None
+        self, model: Model, state: SineState, clock: NDArray[np.float64], constants: NDArray[np.float64] | None = None
     ) -> None:
         """Bind to a state and a window position, clock of shape (1, N_CLOCK)."""
         model = model if constants is None else replace(model, constants=constants)
-        chunk = Chunk.empty(model, 1, 1, 1)
+        chunk = Chunk.empty(model.ingredients, 1, 1, 1)
         chunk.clock[:] = clock
-        self.state, self.stepper, self.model = state, Stepper(model, state, chunk), model
+        self.state, self.stepper, self.model = state, SineStepper(model, state, chunk), model
         self.stepper.move(0)
 
     def first(self) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State, positions
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 from tiengine.track.fastening import seat_count, seat_tables
@@ -42,8 +43,8 @@ class Seated:
 
     def __init__(self, model: Model, X: float, V: float = V350) -> None:
         self.model, self.X, self.V = model, X, V
-        self.state = State.at_rest(model)
-        clock = positions(model, np.array([X]), np.array([V]), np.zeros(1)).clock
+        self.state = SineState.at_rest(model)
+        clock = window_clock(model.ingredients.slab, np.array([X]), np.array([V]), np.zeros(1))
         self.clock = clock
         self.first_slab = int(clock[0, at.FIRST_SLAB])
         self.state.enter(model, int(clock[0, at.FIRST_SEAT]), self.first_slab)

@@ -7,8 +7,9 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.chunk import Chunk
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.kernels import layout as at
 from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes
 from tiengine.model.model import Model
@@ -72,10 +73,10 @@ def rail_period_error(dt: float) -> float:
     A one-mass oscillator in the step's own kernels: the mode is decoupled, and its frequency k sqrt(GK/J) is known.
     """
     model = paper_model(modes=24, V=1e-9, dt=dt, passes=16, seat_factors=lambda first, count: np.zeros((count, 2)))
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     steps = round(5e-3 / dt)
-    chunk = Chunk.empty(model, steps, 1, 1)
-    stepper = Stepper(model, state, chunk)
+    chunk = Chunk.empty(model.ingredients, steps, 1, 1)
+    stepper = SineStepper(model, state, chunk)
     r = model.ingredients.rail
     mode = 7
     omega = (mode + 1) * np.pi / 36.0 * np.sqrt(r.GK / (r.rho * r.I_polar))

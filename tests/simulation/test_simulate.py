@@ -9,7 +9,7 @@ import pytest
 import xarray
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.engine.static_track import StaticTrack
 from tiengine.kernels import layout as at
 from tiengine.scenario.scenario import load_scenario
@@ -92,7 +92,7 @@ def test_ripple_has_the_size_of_the_tracks_contrast(smooth):
     """
     run, _ = smooth
     model = run.model
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     deflection = []
     for X in np.linspace(0.5 * SEAT_PITCH, 1.5 * SEAT_PITCH, 8, endpoint=False):
         state.enter(model, 1, 0)

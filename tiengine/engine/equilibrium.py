@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State, positions
+from tiengine.engine.sine_state import SineState
 from tiengine.engine.static_track import StaticTrack
+from tiengine.engine.window import window_clock
 from tiengine.kernels import contact as kernels
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import N_CONTACT
@@ -87,7 +88,7 @@ def evaluate_contact(
     return out
 
 
-def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 0.0) -> None:
+def equilibrium(model: Model, state: SineState, X: float, V: float, V_rate: float = 0.0) -> None:
     """Put all trains of a state into steady rolling on a smooth track.
 
     Args:
@@ -100,7 +101,7 @@ def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 
     Raises:
         InputError: Newton's method found no equilibrium.
     """
-    clock = positions(model, np.array([X]), np.array([V]), np.array([V_rate])).clock[0]
+    clock = window_clock(model.ingredients.slab, np.array([X]), np.array([V]), np.array([V_rate]))[0]
     state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
     track = StaticTrack(model, state, float(clock[at.FIRST_SEAT_S]), V)
     problem = _Problem(model, track, V, V_rate)
@@ -118,7 +119,7 @@ def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 
     state.wheelset_force[:], state.rail_force[:] = forces.wheelset, forces.rail
 
 
-def release(model: Model, state: State, X: float) -> None:
+def release(model: Model, state: SineState, X: float) -> None:
     """Put all trains onto the track without load, as the paper does: all zero but the weight's acceleration.
 
     Args:
@@ -126,7 +127,7 @@ def release(model: Model, state: State, X: float) -> None:
         state: Written.
         X: Chainage of the window's rear end [m].
     """
-    clock = positions(model, np.array([X]), np.zeros(1), np.zeros(1)).clock[0]
+    clock = window_clock(model.ingredients.slab, np.array([X]), np.zeros(1), np.zeros(1))[0]
     state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
     n = model.ingredients.train.n_dof
     mass = np.diag(model.ingredients.train.M)

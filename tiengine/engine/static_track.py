@@ -12,7 +12,7 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 
@@ -22,7 +22,7 @@ __all__ = ["StaticTrack"]
 class StaticTrack:
     """Compliance of both rails on slabs; unknowns of a rail are w, theta_y, v, theta_z, theta_x, each N."""
 
-    def __init__(self, model: Model, state: State, first_seat_s: float, V: float, train: int = 0) -> None:
+    def __init__(self, model: Model, state: SineState, first_seat_s: float, V: float, train: int = 0) -> None:
         """Assemble and factorise.
 
         Args:
@@ -100,7 +100,7 @@ class StaticTrack:
             slabs[slot] = -la.lu_solve(lu, to_slab @ q)
         return q.reshape(2, -1), slabs
 
-    def _springs(self, state: State, s0: float, train: int) -> dict[int, _Springs]:
+    def _springs(self, state: SineState, s0: float, train: int) -> dict[int, _Springs]:
         """Springs of the seats in the window, by slab."""
         g = self.model.ingredients
         d, per_slab = g.slab.fastening_pitch, g.slab.fastenings

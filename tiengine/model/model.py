@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tiengine.contact.table import ContactTable
 from tiengine.irregularity.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
-from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes, smearing
+from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes, smeared_fastening
 from tiengine.model.newmark import Newmark, inverse
 from tiengine.model.speed_blocks import Blocks
 from tiengine.track.fastening import Fastening, seat_count, seat_tables
@@ -25,7 +25,7 @@ from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail, RailWindow, sine_products
 from tiengine.track.slab import Slab
 from tiengine.track.slab_matrices import SlabMatrices
-from tiengine.vehicle.train import TrainModel, static_wheel_loads
+from tiengine.vehicle.train import TrainModel, centre_in_window, static_wheel_loads
 
 __all__ = ["Ingredients", "Model", "SlabDesigns", "build_model"]
 
@@ -95,8 +95,36 @@ class Ingredients:
 
     @property
     def slots(self) -> int:
-        """Slabs in memory: the paper's Eq. (16), or one more, since a moving window can touch that many."""
-        return int(np.floor(self.length / self.slab.pitch)) + (2 if self.cover else 1)
+        """Slabs in memory."""
+        return self.slab.slots(self.length, self.cover)
+
+    @property
+    def seats(self) -> int:
+        """Most seats in the window at once."""
+        return seat_count(self.length, self.slab.fastening_pitch)
+
+    @property
+    def centre_s(self) -> float:
+        """Centre of the first vehicle in the window [m]."""
+        return centre_in_window(self.length, self.train.wheelset_x)
+
+    @property
+    def wheel_s(self) -> NDArray[np.float64]:
+        """Wheels in the window [m], shape (W,)."""
+        return self.centre_s + self.train.wheelset_x
+
+    @property
+    def dof_counts(self) -> dict[str, int]:
+        """Degrees of freedom of one train: vehicles (internal states apart), rails, slabs, all."""
+        vehicles, rails = self.train.n_dof, 2 * 5 * self.modes
+        slabs = self.slots * self.designs.matrices[0].n
+        return {
+            "vehicles": vehicles,
+            "rails": rails,
+            "slabs": slabs,
+            "total": vehicles + rails + slabs,
+            "internal_states": self.train.n - self.train.n_dof,
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +134,6 @@ class Model:
     Attributes:
         ingredients: What the model was made from.
         window: Rail matrices.
-        wheel_s: Wheels in the window [m], shape (W,).
-        centre_s: Centre of the first vehicle in the window [m].
         dims: Sizes and offsets (``layout``).
         constants: Numbers (``layout``).
         stiffness: Elastic coefficients of the rails by mode, shape (N, 8).
@@ -131,8 +157,6 @@ class Model:
 
     ingredients: Ingredients
     window: RailWindow
-    wheel_s: NDArray[np.float64]
-    centre_s: float
     dims: NDArray[np.int32]
     constants: NDArray[np.float64]
     stiffness: NDArray[np.float64]
@@ -157,20 +181,6 @@ class Model:
     wheel_shape: NDArray[np.float64]
     blocks: Blocks
 
-    @property
-    def dof_counts(self) -> dict[str, int]:
-        """Degrees of freedom of one train: vehicles (internal states apart), rails, slabs, all."""
-        g = self.ingredients
-        vehicles, rails = g.train.n_dof, 2 * 5 * g.modes
-        slabs = g.slots * int(self.dims[at.SLAB_DOFS])
-        return {
-            "vehicles": vehicles,
-            "rails": rails,
-            "slabs": slabs,
-            "total": vehicles + rails + slabs,
-            "internal_states": g.train.n - g.train.n_dof,
-        }
-
     def refactor(self, V: float) -> None:
         """Fill the blocks that depend on the speed V [m/s]."""
         g = self.ingredients
@@ -180,17 +190,12 @@ class Model:
 def build_model(ingredients: Ingredients, V: float) -> Model:
     """Assemble and factorise everything for a speed V [m/s]."""
     window = RailWindow(ingredients.rail, ingredients.length, ingredients.modes)
-    train = ingredients.train
-    middle = 0.5 * (train.wheelset_x.max() + train.wheelset_x.min())
-    centre_s = ingredients.length / 2.0 - middle
-    wheel_s = centre_s + train.wheelset_x
+    train, wheel_s = ingredients.train, ingredients.wheel_s
     first = ingredients.designs.matrices[0]
     sine, cosine = sine_products(ingredients.modes)
     model = Model(
         ingredients=ingredients,
         window=window,
-        wheel_s=wheel_s,
-        centre_s=float(centre_s),
         dims=_dims(ingredients, first),
         constants=_constants(ingredients, window),
         stiffness=window.modal_stiffness,
@@ -213,7 +218,7 @@ def _dims(ingredients: Ingredients, first: SlabMatrices) -> NDArray[np.int32]:
     n, B = ingredients.modes, ingredients.trains
     explicit, no_tension = ingredients.explicit_mortar, ingredients.mortar.no_tension
     dims[at.TRAINS], dims[at.MODES], dims[at.SLOTS], dims[at.SLAB_DOFS] = B, n, ingredients.slots, first.n
-    dims[at.SEATS] = seat_count(ingredients.length, ingredients.slab.fastening_pitch)
+    dims[at.SEATS] = ingredients.seats
     dims[at.VEHICLE_DOFS], dims[at.WHEELSETS] = ingredients.train.n, len(ingredients.train.wheelset_x)
     dims[at.SEATS_PER_SLAB] = ingredients.slab.fastenings
     dims[at.LATERAL] = B * 4 * n
@@ -239,7 +244,8 @@ def _constants(ingredients: Ingredients, window: RailWindow) -> NDArray[np.float
     c[at.FRICTION], c[at.CROWN_OFFSET] = ingredients.friction, table.crown_offset
     c[at.IRREGULARITY_HALF_BASE], c[at.CONTACT_TOLERANCE] = HALF_BASE, CONTACT_TOLERANCE
     c[at.STATIC_LOAD] = float(np.max(static_wheel_loads(ingredients.train)))
-    c[at.SMEARING] = smearing(window, ingredients.slab.fastening_pitch)
+    smeared = smeared_fastening(window, fastening, ingredients.slab.fastening_pitch, newmark)
+    c[at.SMEARED_VERTICAL], c[at.SMEARED_LATERAL] = smeared
     if ingredients.local_compliance:
         c[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1] = window.missing_compliance
     c[at.ABSORBING_ZONE] = ingredients.absorbing_zone

@@ -29,6 +29,7 @@ from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
 from tiengine.track.defects import check_defects
 from tiengine.track.mortar import MortarVoid
+from tiengine.vehicle.train import centre_in_window
 
 __all__ = ["Scenario", "check_wavelength", "duration", "load_scenario", "to_toml"]
 
@@ -92,8 +93,7 @@ class Scenario(Params):
     @cached_property
     def centre_in_window(self) -> float:
         """Centre of the first vehicle from the window's rear end [m]: the wheels stand in its middle."""
-        x = self.parts.wheelset_positions
-        return self.window_length / 2.0 - 0.5 * float(x.max() + x.min())
+        return centre_in_window(self.window_length, self.parts.wheelset_positions)
 
     @cached_property
     def modes(self) -> int:

@@ -13,7 +13,7 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from tiengine.engine.equilibrium import ContactForces, evaluate_contact
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.irregularity.irregularity import Irregularity
 from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
@@ -122,7 +122,7 @@ class SemiDiscrete:
         return self._contact(t, u[self.dof][None], v[self.dof][None], self.under_wheels(u, v)[None])
 
     def _contact(self, t: float, *motion: NDArray[np.float64]) -> ContactForces:
-        felt = self.track.sample(self.V * t + self.model.wheel_s)
+        felt = self.track.sample(self.V * t + self.model.ingredients.wheel_s)
         return evaluate_contact(self.model, self.V, felt, *motion)
 
     def rhs(self, t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -195,7 +195,7 @@ class SemiDiscrete:
             out.append(rows)
         return out
 
-    def pack(self, state: State) -> NDArray[np.float64]:
+    def pack(self, state: SineState) -> NDArray[np.float64]:
         """The y of an engine's state whose window begins at the first of the slabs."""
         halves = []
         for row in (at.U, at.V):
