@@ -1,4 +1,4 @@
-"""What goes into a number of steps, and what they record."""
+"""Input and records of a number of steps."""
 
 from __future__ import annotations
 

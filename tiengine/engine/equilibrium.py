@@ -1,4 +1,4 @@
-"""Start from steady rolling at speed V over the seats as they stand at t = 0 (MODEL §7).
+"""Start from steady rolling at speed V over the seats at their places at t = 0 (MODEL §7).
 
 With d/dt = 0 everywhere but for the wheelsets' spin, the track is linear: the rails' motion under the wheels follows
 from the contact forces by a constant compliance. Unknowns are the train's coordinates (a wheelset's pitch is replaced
@@ -33,7 +33,7 @@ NUDGE_FORCE = 1.0  # N
 
 @dataclass(frozen=True, eq=False)
 class ContactForces:
-    """What the contact kernel returns; B trains, W wheelsets.
+    """Results of the contact kernel; B trains, W wheelsets.
 
     Attributes:
         contact: Contact states, shape (B, W, 2, N_CONTACT).

@@ -22,10 +22,10 @@ class Scratch:
         flow: 2 V du/dt + dV/dt u of the fields w, v, theta_x, theta_y, theta_z, shape (5, B, 2, N); fields outermost,
             so that all trains are right-hand sides of one product.
         drift: G times these, same shape.
-        rail_factor: Modal numbers of what the rails pull at the seats (V, L, M), shape (B, 2, 3, 2N).
-        rail_pull: What they pull [N, N, N m], shape (B, 2, 3, seats).
+        rail_factor: Modal factors of the forces at the seats by the rails' motion (V, L, M), shape (B, 2, 3, 2N).
+        rail_pull: These forces [N, N, N m], shape (B, 2, 3, seats).
         slab_factor: k u + c v of the slabs, shape (B, slots, dofs).
-        slab_pull: What their motion takes off at the seats, at the predictors and at the iterate, moments by b^2,
+        slab_pull: Forces at the seats by their motion, at the predictors and at the iterate, moments over b^2,
             shape (2, B, slots, 5, n).
         slab_force: Forces of the seats on the slabs, shape (B, slots, 5, n).
         bed_motion: Bed's k u + c v of the slabs, shape (B slots dofs,).

@@ -92,7 +92,7 @@ class SineState(State):
     @property
     def slots(self) -> int:
         """Slabs in memory."""
-        return self.design.shape[1]
+        return int(self.design.shape[1])
 
     @property
     def normal_force(self) -> Reals:

@@ -32,7 +32,7 @@ class SineStepper(Stepper):
 
     Attributes:
         model: Constant data.
-        scratch: Work arrays that the stages leave for one another.
+        scratch: Work arrays shared by the stages.
     """
 
     state: SineState
@@ -90,7 +90,7 @@ class SineStepper(Stepper):
         self._tick[:, _ROWS] = i, wheel_row
 
     def _predict(self) -> Iterator[Stage]:
-        """Predictors; shapes of the seats where they stand at the end, factors of the products, rails under wheels."""
+        """Predictors; shapes of the seats at their places at the end, factors of the products, rails under wheels."""
         motion = self.state.motion
         predictor = self.ingredients.newmark.predictor
         yield "predict", _product(predictor, motion[at.U : at.A + 1], motion[at.U_PREDICTED : at.LINEAR])
@@ -113,7 +113,7 @@ class SineStepper(Stepper):
         yield "slabs", partial(np.add, motion[at.LINEAR, own], k.damped, motion[at.LINEAR, own])
 
     def _motion_at_seats(self, number: int) -> Iterator[Stage]:
-        """Forces that rails and slabs pull with at the seats: slabs at the predictors, then at the iterate."""
+        """Forces at the seats by the motion of rails and slabs, slabs at the predictors in the first pass."""
         m, k = self.model, self.scratch
         pull = k.slab_pull[min(number, 1)]
         yield "seats", _product(_rows(k.rail_factor), k.seat_shape, _rows(k.rail_pull))
@@ -210,11 +210,11 @@ class SineStepper(Stepper):
         if rows == 0 or self._explicit_bed:  # then they are known from the forces
             return
         kinds = k.design[:rows].ravel()
-        factor, rest = (values.reshape(len(values), -1)[kinds] for values in (m.bed_factor, m.bed_rest))
+        factor, at_rest = (values.reshape(len(values), -1)[kinds] for values in (m.bed_factor, m.bed_rest))
         for bed, out in zip(k.bed[:, :rows], self.chunk.mortar[:, :rows], strict=True):
             pressure = bed.reshape(len(kinds), -1) @ m.bed_points
             pressure *= factor
-            pressure += rest
+            pressure += at_rest
             out[..., 0] = pressure.max(axis=1).reshape(out.shape[:2])
             out[..., 1] = pressure.min(axis=1).reshape(out.shape[:2])
 
@@ -249,7 +249,7 @@ class SineStepper(Stepper):
         return time.perf_counter() - clock + sum(launch.compile_seconds for launch in self._launches)
 
     def move(self, i: int) -> None:
-        """Let seats and slabs in and out at step ``i``; factorise anew when the speed has changed enough."""
+        """Let seats and slabs in and out at step ``i``; factorise again when the speed has changed enough."""
         clock = self.chunk.clock[i]
         window, V = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])), float(clock[at.SPEED])
         if window != self._window:  # the first step too: the start has let the first slabs in

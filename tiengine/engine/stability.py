@@ -1,9 +1,9 @@
 """Stability of a time step, found with the step itself before the run.
 
-The track's free vibration from random velocities, wheels lifted off, is advanced by the very kernels and inverses of
-the run, window moving at its speed. A track only loses energy, so energy that grows belongs to the step: the explicit
-iterates of the fastenings reach too far for the implicit blocks' stand-in. Contact needs no such estimate; it is solved
-implicitly.
+The track's free vibration from random velocities, wheels lifted off, is advanced by the kernels and inverses of the
+run, with the window moving at its speed. A track only loses energy, so growing energy is due to the step: the explicit
+iterates of the fastenings are too stiff for the smeared fastenings of the implicit blocks. Contact needs no such
+estimate; it is solved implicitly.
 """
 
 from __future__ import annotations

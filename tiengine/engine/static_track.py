@@ -1,7 +1,7 @@
-"""The track under steady loads: d/dt = 0 in the moving frame, seats where they stand at one instant.
+"""Track under steady loads: d/dt = 0 in the moving frame, seats at their places at one instant.
 
-Assembled from matrices on the host, apart from the kernels (which it also checks). A fastening's damper still feels the
-convective rate -V d/ds. Slabs are eliminated one by one, since each is joined to the rails only.
+Assembled from matrices on the host, independently of the kernels (which it also checks). A fastening's damper still
+responds to the convective rate -V d/ds. Slabs are eliminated one by one, since each is joined to the rails only.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ class StaticTrack:
 
         Args:
             model: Constant data.
-            state: Gives slabs and fastenings of the window.
+            state: Slabs and fastenings of the window.
             first_seat_s: Rear seat [m from the window's rear end].
             V: Speed [m/s].
-            train: Which train's track.
+            train: Place of the train whose track is taken.
         """
         self.model, self.V = model, V
         n = model.ingredients.modes
@@ -62,10 +62,12 @@ class StaticTrack:
         fields = q[:, [0, 2, 4]]
         value, slope = (np.einsum("wn,rfnk->wrfk", shape[kind], fields) for kind in (0, 1))
         wheels = np.arange(W)[:, None], np.arange(2)
-        value = np.ascontiguousarray(value)  # what follows changes it in place
+        value = np.ascontiguousarray(value)  # changed in place below
         missing = value.reshape(W, 2, 3, W, 2, 3)
         for m, compliance in enumerate(model.constants[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1]):
-            missing[(*wheels, m, *wheels, m)] += compliance  # of the modes left out: a wheel feels its own force only
+            missing[(*wheels, m, *wheels, m)] += (
+                compliance  # of the truncated modes: a wheel responds to its own force only
+            )
         self._compliance = np.concatenate([value, slope, np.zeros_like(value)], axis=2)
 
     def under_wheels(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -93,7 +95,7 @@ class StaticTrack:
         return self.respond(self._place @ force.ravel())
 
     def respond(self, load: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """As :meth:`motion`, under generalised forces on the rails' coordinates, shape (10 N,)."""
+        """Generalised coordinates, as :meth:`motion`, under generalised forces on the rails, shape (10 N,)."""
         q = la.lu_solve(self._lu, load)
         slabs = np.zeros((self.model.ingredients.slots, int(self.model.dims[at.SLAB_DOFS])))
         for slot, lu, to_slab in self._slabs:

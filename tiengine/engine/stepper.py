@@ -1,7 +1,7 @@
 """Frame of a time step: what it offers to the time loop, to recorder and watchers, and to a profiler.
 
-A kind of step derives from :class:`Stepper` and gives its stages, its state and what is made anew when the speed
-changes. Loading a chunk, running the stages in order, watchers after them and readings of a clock between them are the
+A kind of step derives from :class:`Stepper` and supplies its stages, its state and the matrices that depend on the
+speed. Loading a chunk, running the stages in order, watchers after them and readings of a clock between them are the
 same for all.
 """
 
@@ -49,7 +49,7 @@ class Stepper(ABC):
     """Advances a group of trains.
 
     Attributes:
-        ingredients: What the model was made from.
+        ingredients: Track, train and numerics.
         state: Physical quantities at the end of the last step.
         chunk: Input and records of a number of steps.
         rows: Rows that the present step fills.
@@ -62,7 +62,7 @@ class Stepper(ABC):
     factored_speed: float
 
     def __init__(self, ingredients: Ingredients, state: State, chunk: Chunk) -> None:
-        """Keep what all kinds of step need; a kind calls :meth:`bind` once its stages can be made."""
+        """Keep the data of every kind of step; a derived class calls :meth:`bind` once its stages can be made."""
         self.ingredients, self.state, self.chunk = ingredients, state, chunk
         self.rows = Rows(-1)
         self.moves = np.zeros(0, dtype=np.bool_)
@@ -150,7 +150,7 @@ class Stepper(ABC):
             call()
 
     def _bind_calls(self) -> None:
-        """Calls of a step: its stages, with readings of the clock where they are wanted."""
+        """Make the calls of a step: its stages, with readings of the clock between them if they are timed."""
         stages, mark = (*self.stages, *self.watchers), self._mark
         if mark is None:
             self._calls = tuple(call for _, call in stages)

@@ -1,4 +1,4 @@
-"""Set-up of a run: the longest time step that is stable, and the model at that step."""
+"""Longest stable time step of a scenario, and the model at that step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tiengine.scenario.tables import Output
 __all__ = ["AUTO_STEPS", "prepare"]
 
 AUTO_STEPS = (2e-4, 1e-4, 5e-5, 2.5e-5)
-"""Steps that "auto" tries, the longest first: 2e-4 s keeps wheel forces within 0.3 % of their peak (README)."""
+"""Steps that "auto" tries [s], the longest first: 2e-4 s keeps wheel forces within 0.3 % of their peak (README)."""
 
 
 def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) -> tuple[Model, float]:
@@ -30,7 +30,7 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     Args:
         scenario: Checked scenario of one train.
         public_launch: Public Taichi calls only.
-        trains: How many of them are advanced together; the step does not depend on it.
+        trains: Trains advanced together; the step does not depend on their number.
 
     Returns:
         The model, and the wall time of compiling the step's kernels [s].
@@ -72,7 +72,7 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
 
 @dataclass(frozen=True)
 class _Key:
-    """A scenario less what the ingredients of a model do not depend on; compared by its text.
+    """A scenario without the keys that the ingredients of a model do not depend on; compared by its text.
 
     Attributes:
         text: The scenario as TOML.
@@ -98,5 +98,5 @@ class _Key:
 
 @lru_cache(maxsize=2)
 def _ingredients(key: _Key) -> Ingredients:
-    """Ingredients at some time step; kept, since the contact table takes seconds and outlives a change of speed."""
+    """Ingredients at the first time step; cached, since the contact table takes seconds and holds for all speeds."""
     return ingredients(key.scenario, AUTO_STEPS[0])

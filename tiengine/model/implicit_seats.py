@@ -15,9 +15,9 @@ from tiengine.track.slab_matrices import SlabMatrices
 def smearing(window: RailWindow, spacing: float) -> float:
     """Factor on the smeared fastenings of A_s, so that the passes converge for any number of modes.
 
-    Discrete seats are between 0 and N d / l times as stiff as smeared ones, seen by single wave shapes (all waves of a
-    set that coincide at the seats add up). The iteration contracts if A_s reaches half the upper end; a larger A_s only
-    slows it. Up to 2 / d modes a metre (3.2 for 0.63 m) the factor is one.
+    For a single wave shape, discrete seats are between 0 and N d / l times as stiff as smeared ones (all waves of a set
+    that coincide at the seats add up). The iteration contracts if A_s is at least half the upper bound; a larger A_s
+    only slows it. Up to 2 / d modes per metre (3.2 for 0.63 m) the factor is one.
     """
     return max(1.0, 0.5 * window.modes * spacing / window.length)
 

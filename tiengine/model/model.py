@@ -1,6 +1,6 @@
-"""The constant data of a group of trains that are advanced together.
+"""Constant data of a group of trains that are advanced together.
 
-All trains of a group run the same window along the same track at the same speed; they differ in their realisation
+All trains of a group move with the same window along the same track at the same speed; they differ in the realisation
 of the irregularity. Arrays have the shapes that the kernels of :mod:`tiengine.kernels.step` read.
 """
 
@@ -49,7 +49,7 @@ class SlabDesigns:
 
 @dataclass(frozen=True)
 class Ingredients:
-    """What a model is made from.
+    """Ingredients of a model: track, train and numerics.
 
     Attributes:
         rail: Rail section, the same left and right.
@@ -65,11 +65,11 @@ class Ingredients:
         length: Window l [m].
         modes: N.
         newmark: Step and coefficients.
-        passes: Passes a step.
+        passes: Passes per step.
         cover: Enough slabs for every seat of the window, or the paper's count.
-        explicit_mortar: The bed in the explicit half.
-        local_compliance: Add the static compliance of the modes left out, under the wheels.
-        absorbing_zone: Length of the zones at the window's ends with more fastening, to the ground [m]; 0 for none.
+        explicit_mortar: Treat the bed explicitly.
+        local_compliance: Add the static compliance of the truncated modes under the wheels.
+        absorbing_zone: Length of the zones at the window's ends with additional springs to the ground [m]; 0 for none.
         trains: Trains advanced together.
     """
 
@@ -132,7 +132,7 @@ class Model:
     """Constant arrays of the step.
 
     Attributes:
-        ingredients: What the model was made from.
+        ingredients: Track, train and numerics.
         window: Rail matrices.
         dims: Sizes and offsets (``layout``).
         constants: Numbers (``layout``).
@@ -140,9 +140,10 @@ class Model:
         flow_sine, flow_cosine: G of the sine and cosine fields, transposed, shape (N, N).
         seat_table: cos and sin of k_i j d, shape (2N, seats).
         slab_seats: Slab coordinates to the seats: w left and right, dw/dy left and right, y; shape (dofs, 5 seats).
-        slab_linear: A slab's u, and its v, to its acceleration by its own stiffness and damping, shape
-            (2, designs, dofs, dofs).
-        slab_push: Forces of the seats (as ``slab_seats``) to the slab's acceleration, shape (designs, 5 seats, dofs).
+        slab_linear: Matrices from a slab's u, and from its v, to its acceleration by its own stiffness and damping,
+            shape (2, designs, dofs, dofs).
+        slab_push: Matrices from the forces of the seats (as ``slab_seats``) to the slab's acceleration, shape
+            (designs, 5 seats, dofs).
         slab_inverse: Inverses of the slab blocks, transposed, shape (designs, dofs, dofs).
         bed_index, bed_shape, bed_weight: Quadrature of the bed.
         bed_points: Slab coordinates to w at all quadrature points, shape (dofs, points).

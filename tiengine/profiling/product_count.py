@@ -71,7 +71,7 @@ def count_products(stepper: Stepper) -> dict[str, Work]:
         return counted
 
     with patch.object(np, "matmul", counting(np.matmul)), patch.object(np, "dot", counting(np.dot)):
-        stepper.bind()  # stages hold on to the products that they were made with
+        stepper.bind()  # stages keep the products that they were made with
         stepper.rows = Rows(max(stepper.rows.step, 0))
         for name, call in stepper.stages:
             found.clear()

@@ -215,19 +215,19 @@ def array_bytes(data: Any) -> int:
     """Bytes of the NumPy arrays that an object of dataclasses, mappings and sequences holds, each counted once."""
     seen: dict[int, int] = {}
 
-    def look(value: Any) -> None:
+    def visit(value: Any) -> None:
         if isinstance(value, np.ndarray):
             owner = value if value.base is None or not isinstance(value.base, np.ndarray) else value.base
             seen[id(owner)] = owner.nbytes
         elif is_dataclass(value):
             for each in fields(value):
-                look(getattr(value, each.name))
+                visit(getattr(value, each.name))
         elif isinstance(value, dict):
             for each in value.values():
-                look(each)
+                visit(each)
         elif isinstance(value, (tuple, list)):
             for each in value:
-                look(each)
+                visit(each)
 
-    look(data)
+    visit(data)
     return sum(seen.values())

@@ -186,7 +186,7 @@ def read_json(path: Path) -> ProfileReport:
         raise InputError(f"{name}: must be a file that 'tiengine profile --json' wrote")
     version = tables.pop("format_version", None)
     if version != FORMAT_VERSION:
-        raise InputError(f"{name}: format version {version}; must be {FORMAT_VERSION}; profile anew with this tiengine")
+        raise InputError(f"{name}: format version {version}; must be {FORMAT_VERSION}; profile again with this version")
     try:
         return TypeAdapter(ProfileReport).validate_python(tables)
     except ValidationError as error:

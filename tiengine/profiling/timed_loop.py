@@ -79,7 +79,7 @@ class StageTimer(LoopTimer):
     """Measures the loop of a run.
 
     Attributes:
-        times: What was measured so far.
+        times: Times measured so far.
         block: Steps in a block.
     """
 

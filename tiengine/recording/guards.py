@@ -145,15 +145,15 @@ class Guard:
         lifted += self.every * self._dt
         lifted[self._normal > 0.0] = 0.0
         lasting = lifted >= self.policy.wheel_lift_time
-        self._wheels(2, lasting, step, time, position, f"off the rail for {self.policy.wheel_lift_time:g} s")
+        self._report_wheels(2, lasting, step, time, position, f"off the rail for {self.policy.wheel_lift_time:g} s")
 
     def _climbs(self, step: int, time: float, position: float) -> None:
         """Report wheels beyond the steepest part of their flange, or beyond their profile."""
         climbs = (self._shift > self._climb) & (self._normal > 0.0)
         words = f"climbs on its flange: lateral shift beyond {self._climb * 1e3:.1f} mm"
-        self._wheels(1, climbs, step, time, position, words)
+        self._report_wheels(1, climbs, step, time, position, words)
         words = f"derailed: lateral shift beyond {self._derailed * 1e3:.1f} mm on the flange side"
-        self._wheels(0, self._shift > self._derailed, step, time, position, words)
+        self._report_wheels(0, self._shift > self._derailed, step, time, position, words)
 
     def take(self) -> dict[int, list[Event]]:
         """Events since the last call, by place of the train."""
@@ -168,14 +168,16 @@ class Guard:
         if event.stops:
             self.stopped[train] = step
 
-    def _wheels(self, kind: int, wrong: NDArray[np.bool_], step: int, time: float, position: float, words: str) -> None:
+    def _report_wheels(
+        self, kind: int, affected: NDArray[np.bool_], step: int, time: float, position: float, words: str
+    ) -> None:
         """Report wheels with an event, each when it begins."""
         name, last = EVENT_KINDS[kind], self.watch.last[kind]
         stops = getattr(self.policy, name) == "stop"
-        for train, wheelset, side in np.argwhere(wrong & (last < time - QUIET)):
+        for train, wheelset, side in np.argwhere(affected & (last < time - QUIET)):
             sentence = f"wheelset {wheelset + 1} {SIDES[side]} {words}"
             self._report(int(train), step, Event(name, time, position, int(wheelset) + 1, SIDES[side], sentence, stops))
-        last[wrong] = time
+        last[affected] = time
 
     def _track_ends(self, step: int, time: float, position: float) -> None:
         for train in np.flatnonzero((position + self._wheel_front > self.track_end) & ~self.watch.ended):

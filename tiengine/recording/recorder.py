@@ -182,7 +182,7 @@ class Recorder:
         }
 
     def _cast(self, times: Times, channels: dict[str, NDArray[np.float64]]) -> Block:
-        """Copies, since the buffers are filled anew; in the file's precision, to halve what workers send."""
+        """Copy, since the buffers are filled again; in the file's precision, to halve the data that workers send."""
         dtype = DTYPES[self.scenario.output.precision]
         return Block(*times, {name: np.array(value, dtype) for name, value in channels.items()})
 

@@ -113,7 +113,7 @@ class SeatEnvelopes:
         self._left.append((self.first_seat + first, np.stack([self.largest[..., rear], self.smallest[..., rear]])))
 
     def _move(self, first_seat: int) -> None:
-        """Shift the seats to their new places; seats that enter the watched part begin anew."""
+        """Shift the seats to their new places; seats that enter the watched part start again."""
         _, end = watched_seats(self.stepper.ingredients)
         passed = first_seat - self.first_seat
         if self.first_seat >= 0:

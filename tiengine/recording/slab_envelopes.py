@@ -43,7 +43,7 @@ class SlotExtremes:
         return cls(np.full(shape, -np.inf), np.full(shape, np.inf), starts)
 
     def move(self, first_slab: int) -> None:
-        """Put aside the slabs behind a new rear slab; their slots begin anew."""
+        """Put aside the slabs behind a new rear slab; their slots start again."""
         if first_slab == self.first_slab:
             return
         slots = self.largest.shape[1]
@@ -71,7 +71,7 @@ class SlotExtremes:
         largest, smallest = np.concatenate([none, *(extremes[:, :, None] for _, extremes in left)], axis=2)
         return np.array([slab for slab, _ in left], dtype=np.int64), largest, smallest
 
-    def leave(self) -> None:
+    def put_aside_all(self) -> None:
         """Put aside all slabs."""
         if self.first_slab >= 0:
             self.move(self.first_slab + self.largest.shape[1])
@@ -148,8 +148,8 @@ class SlabEnvelopes:
 
     def remainder(self) -> list[Block]:
         """Slabs still in memory."""
-        self.shape.leave()
-        self.pressure.leave()
+        self.shape.put_aside_all()
+        self.pressure.put_aside_all()
         return self._taken()
 
     def saved(self) -> dict[str, Reals]:

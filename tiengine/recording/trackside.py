@@ -1,7 +1,7 @@
 """Records of the track: envelopes of seats and slabs, gauges, snapshots of the deflection.
 
 Watchers read the state at the end of every step. With each chunk of steps they hand over what is complete, so that
-memory does not grow with distance; the rest that they hold are plain arrays, which :meth:`Trackside.saved` returns and
+memory does not grow with distance; what they keep are plain arrays, which :meth:`Trackside.saved` returns and
 :meth:`Trackside.restore` takes.
 """
 
@@ -77,7 +77,7 @@ class Trackside:
         """Watchers of the groups that a scenario records, called by the stepper after each step.
 
         Args:
-            scenario: Says what is recorded.
+            scenario: Selects the groups that are recorded.
             stepper: Is watched.
         """
         watchers = dict(_watchers(scenario, stepper))
@@ -112,7 +112,7 @@ class Trackside:
         return found
 
     def saved(self) -> dict[str, Reals]:
-        """All that the rest of the run depends on, between two chunks."""
+        """Arrays that the coming steps depend on, between two chunks."""
         return {f"{group}.{key}": value for group, each in self.watchers.items() for key, value in each.saved().items()}
 
     def restore(self, saved: Mapping[str, Reals]) -> None:

@@ -99,7 +99,7 @@ def resume(
     """Continue a run that was stopped, killed, or ran out of disk; results have the same bits as without a break.
 
     Args:
-        file: Its result file; checkpoints are expected in the same folder. Trains without one begin anew.
+        file: Its result file; checkpoints are expected in the same folder. Trains without one start at t = 0.
         progress: See :func:`run`.
         notify: See :func:`run`.
         workers: See :func:`run`; may be another number than before.

@@ -152,7 +152,7 @@ def distribute(
                         yield Lost(dead.task.trains, f"worker died twice ({why})")
                     elif not stop():
                         waiting.appendleft(dead.task)
-                        notify(f"a worker died ({why}); its {len(dead.task.trains)} trains are begun again")
+                        notify(f"a worker died ({why}); its {len(dead.task.trains)} trains are started again")
                     continue
                 if message != IDLE:
                     yield message
