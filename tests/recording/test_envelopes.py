@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.kernels import layout as at
 from tiengine.recording.seat_envelopes import SeatEnvelopes, watched_seats
 from tiengine.recording.slab_envelopes import SlabEnvelopes
@@ -150,7 +150,7 @@ def test_what_is_kept_can_be_saved_and_restored():
 
     half = Run(model, V350, X=whole.X - 150 * V350 * DT, steps=150, start=False)
     half.state = state
-    half.stepper = Stepper(model, state, half.chunk)
+    half.stepper = SineStepper(model, state, half.chunk)
     others = watched(half)
     for each, values in zip(others, saved, strict=True):
         each.restore(values)
