@@ -37,7 +37,9 @@ def fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
     module.calls = []
     module.failure = None
 
-    def run(scenario, output=None, *, force=False, progress=None, tell=None, workers=None, checkpoint=60.0, stop=None):
+    def run(
+        scenario, output=None, *, force=False, progress=None, notify=None, workers=None, checkpoint=60.0, stop=None
+    ):
         module.calls.append(scenario)
         groups = {"wheel": GroupSpec.standard("wheel", tuple(WHEEL))}
         with Writer(output, to_toml(scenario), {}, [LABELS], groups, force=force) as writer:

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from threadpoolctl import threadpool_limits
 
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.irregularity.irregularity import make_irregularity
 from validation.cases.bdf import RTOL, SHORT, SIZES, STEPS
 from validation.cases.semi_discrete import SemiDiscrete
@@ -26,10 +26,10 @@ SPEED = 350.0 * KMH
 def system() -> tuple[SemiDiscrete, np.ndarray]:
     """The equations, and the engine's start in their coordinates."""
     model = model_of("paper", *SHORT, dt=1e-4)
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     equilibrium(model, state, 0.0, SPEED)
-    track = make_irregularity(scenario("paper", *SHORT).irregularity, float(model.wheel_s.max()))
-    equations = SemiDiscrete(model, track, SPEED, range(model.given.slots))
+    track = make_irregularity(scenario("paper", *SHORT).irregularity, float(model.ingredients.wheel_s.max()))
+    equations = SemiDiscrete(model, track, SPEED, range(model.ingredients.slots))
     return equations, equations.pack(state)
 
 

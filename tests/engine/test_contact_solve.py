@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tiengine.engine.equilibrium import ContactForces, evaluate_contact
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.kernels import contact as kernels
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
@@ -17,11 +17,11 @@ from ..models import V350, Run, paper_model
 WALK = 5.0 / 3.6  # m/s
 
 
-def at_the_coordinates(model: Model, state: State, V: float, irregularity: NDArray[np.float64]) -> ContactForces:
+def at_the_coordinates(model: Model, state: SineState, V: float, irregularity: NDArray[np.float64]) -> ContactForces:
     """The contact law at a state's coordinates, rails summed over their modes here."""
-    dof, n = model.given.train.wheelset_dof, model.given.modes
+    dof, n = model.ingredients.train.wheelset_dof, model.ingredients.modes
     u, v = (state.view(row, "vehicles")[:, dof] for row in (at.U, at.V))
-    value, slope = model.window.shape(model.wheel_s), model.window.shape_slope(model.wheel_s)
+    value, slope = model.window.shape(model.ingredients.wheel_s), model.window.shape_slope(model.ingredients.wheel_s)
     rail = np.zeros((*u.shape[:2], 2, 9))
     for field, (block, start) in enumerate((("vertical", 0), ("lateral", 0), ("lateral", 2 * n))):
         q, rate = (state.view(row, block)[..., start : start + n] for row in (at.U, at.V))
@@ -34,7 +34,7 @@ def at_the_coordinates(model: Model, state: State, V: float, irregularity: NDArr
 def disturbed(run: Run, seed: int, shift: float, kick: float) -> NDArray[np.float64]:
     """Shift the wheelsets, give every coordinate of the train a velocity; a track for one step, shape (1, 1, W, 8)."""
     rng = np.random.default_rng(seed)
-    train = run.model.given.train
+    train = run.model.ingredients.train
     run.state.view(at.U, "vehicles")[0, train.wheelset_dof[:, 0]] += shift
     run.state.view(at.V, "vehicles")[0] += kick * rng.standard_normal(train.n)
     track: NDArray[np.float64] = kick * 1e-2 * rng.standard_normal((1, 1, 4, at.N_IRREGULARITY))

@@ -19,7 +19,7 @@ from tiengine.parameters.errors import RunStoppedError
 from tiengine.result_files.reader import RUNNING
 from tiengine.result_files.writer import Writer
 from tiengine.simulation import simulate
-from tiengine.simulation.collector import Gathering
+from tiengine.simulation.collector import Collector
 from tiengine.simulation.tasks import Task
 
 from ..fuzzing import DAMAGES, EXAMPLES, Damage, deadline, on_many, refused
@@ -200,7 +200,7 @@ def test_forged_structure_resumed(
 ) -> None:
     """``tiengine resume`` up to the point where it would compute; the file stays as it is."""
 
-    def stop(self: object, writer: Writer, gathering: Gathering, tasks: list[Task]) -> None:
+    def stop(self: object, writer: Writer, collector: Collector, tasks: list[Task]) -> None:
         for train in writer.facts():
             writer.rewind(train, {})
         raise RunStoppedError("here")

@@ -49,7 +49,7 @@ def test_lookup_is_the_tables(model: Model) -> None:
     x.u[:, 0, ROLL] = alpha
     x.u[:, 0, Y] = u + r0 * alpha  # right wheel: u = y - r0 phi
     contact = x.evaluate(model).contact[:, 0, 1]
-    table: ContactTable = model.given.contact
+    table: ContactTable = model.ingredients.contact
     expected = table.lookup(np.clip(u, -16e-3, 13e-3), np.clip(alpha, -6e-3, 6e-3))
     # beyond its range the kernel goes on to the outermost cell's far node, one step further
     inside = (np.abs(alpha) <= 6e-3) & (u >= -16e-3) & (u <= 13e-3)

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium, release
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
@@ -54,7 +55,7 @@ class March:
     """
 
     model: Model
-    state: State
+    state: SineState
     time: NDArray[np.float64]
     wheel: NDArray[np.float64]
     body: NDArray[np.float64]
@@ -76,7 +77,7 @@ def march(
     dt: float,
     duration: float,
     start: str = "equilibrium",
-    each: Callable[[int, Stepper], None] | None = None,
+    each: Callable[[int, SineStepper], None] | None = None,
     model: Model | None = None,
     **options: Any,
 ) -> March:
@@ -95,21 +96,21 @@ def march(
     given = scenario(name, *overrides)
     V = given.train.speed.at(0.0)[0]
     model = model or model_of(name, *overrides, dt=dt)
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     if start == "equilibrium":
         equilibrium(model, state, 0.0, V)
     else:
         release(model, state, 0.0)
-    track = make_irregularity(given.irregularity, float(model.wheel_s.max()))
-    chunk = Chunk.empty(model, CHUNK, CHUNK, CHUNK)
-    stepper = Stepper(model, state, chunk, **options)
+    track = make_irregularity(given.irregularity, float(model.ingredients.wheel_s.max()))
+    chunk = Chunk.empty(model.ingredients, CHUNK, CHUNK, CHUNK)
+    stepper = SineStepper(model, state, chunk, **options)
     steps = round(duration / dt)
     wheels, bodies = [], []
     with threadpool_limits(1):
         for first in range(0, steps, CHUNK):
             count = min(CHUNK, steps - first)
             X = V * dt * np.arange(first + 1, first + count + 1)
-            felt = track.sample(X[:, None] + model.wheel_s)
+            felt = track.sample(X[:, None] + model.ingredients.wheel_s)
             stepper.load(X, np.full(count, V), np.zeros(count), felt[None])
             for i in range(count):
                 stepper.step(i, i, i)

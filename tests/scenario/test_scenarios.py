@@ -181,7 +181,7 @@ def test_the_papers_slab_count():
     paper, cover = (
         march("paper", f"numerics.slab_count='{count}'", dt=2e-4, duration=0.4) for count in ("paper", "cover")
     )
-    assert (paper.model.given.slots, cover.model.given.slots) == (7, 8)
+    assert (paper.model.ingredients.slots, cover.model.ingredients.slots) == (7, 8)
     for kind in ("vertical", "lateral"):
         a, b = getattr(paper, kind), getattr(cover, kind)
         assert np.abs(a - b).max() < 1e-4 * np.abs(b).max()
@@ -189,9 +189,9 @@ def test_the_papers_slab_count():
 
 def test_auto_takes_the_longest_stable_step():
     """Whatever is stable in the trial and short enough for the irregularity."""
-    assert simulate.prepare(scenario("default"))[0].given.newmark.dt == 2e-4
+    assert simulate.prepare(scenario("default"))[0].ingredients.newmark.dt == 2e-4
     fine = scenario("default", "irregularity.wavelength_min=0.1")
-    assert simulate.prepare(fine)[0].given.newmark.dt == 1e-4  # 8 V dt <= 0.1 m
+    assert simulate.prepare(fine)[0].ingredients.newmark.dt == 1e-4  # 8 V dt <= 0.1 m
 
 
 def test_a_measured_series_limits_the_step(tmp_path):
@@ -199,7 +199,7 @@ def test_a_measured_series_limits_the_step(tmp_path):
     file = tmp_path / "track.csv"
     file.write_text("x,z_v\n" + "".join(f"{0.05 * i:.2f},0.0\n" for i in range(2000)))
     measured = f"irregularity.file='{file}'"
-    assert simulate.prepare(scenario("default", measured))[0].given.newmark.dt == 1e-4
+    assert simulate.prepare(scenario("default", measured))[0].ingredients.newmark.dt == 1e-4
     with pytest.raises(InputError, match=r"shortest wavelength = 0\.1: must be at least 8 V dt = 0\.1556 m"):
         simulate.prepare(scenario("default", measured, "numerics.time_step=2e-4"))
 
@@ -240,6 +240,6 @@ def test_the_trial_tells_what_blows_up(modes, dt, passes, damping, stable):
         run = march("default", *overrides, dt=dt, duration=0.2, model=model)
     bounded = (
         bool(np.isfinite(run.wheel).all())
-        and np.abs(run.vertical).max() < 4.0 * static_wheel_loads(model.given.train).max()
+        and np.abs(run.vertical).max() < 4.0 * static_wheel_loads(model.ingredients.train).max()
     )
     assert bounded == stable

@@ -291,12 +291,12 @@ def test_the_trains_of_a_killed_worker_are_begun_again():
             os.kill(killed[0], signal.SIGKILL)
 
     told: list[str] = []
-    with simulate.run(ensemble(**MIXED), workers=2, progress=kill, tell=told.append) as result:
+    with simulate.run(ensemble(**MIXED), workers=2, progress=kill, notify=told.append) as result:
         assert not result.failures
         for train in range(6):
             assert_same_bits(result, mixed(), train)
     # nothing is told if the killed one had sent all it had to
-    assert told in ([], ["a worker died (killed by SIGKILL); its 2 trains are begun again"])
+    assert told in ([], ["a worker died (killed by SIGKILL); its 2 trains are started again"])
     assert multiprocessing.active_children() == []
 
 

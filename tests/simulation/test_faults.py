@@ -25,9 +25,9 @@ from tiengine.result_files.journal import atomic_write, journal_of
 from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulation import collector as gather
+from tiengine.simulation import collector as collecting
 from tiengine.simulation import simulate, worker
-from tiengine.simulation.collector import Gathering
+from tiengine.simulation.collector import Collector
 from tiengine.simulation.disk_space import check_space, estimated_bytes
 from validation.faults.contents import contents, litter
 from validation.faults.page import page, rows
@@ -273,15 +273,15 @@ def test_a_run_that_does_not_fit_says_how_much_is_missing(tmp_path, monkeypatch)
 def test_commits_take_a_hundredth_of_the_time_at_most(monkeypatch):
     """A commit of 2 s: the next one is 200 s away."""
     now = [0.0]
-    monkeypatch.setattr(gather, "time", SimpleNamespace(perf_counter=lambda: now[0]))
+    monkeypatch.setattr(collecting, "time", SimpleNamespace(perf_counter=lambda: now[0]))
 
     def commit() -> None:
         now[0] += 2.0
 
-    gathering = Gathering(load_scenario("paper", SHORT), SimpleNamespace(commit=commit))
-    assert gathering._pause == gather.FLUSH_SECONDS
-    gathering._commit()
-    assert gathering._pause == pytest.approx(2.0 / 0.01)
+    collector = Collector(load_scenario("paper", SHORT), SimpleNamespace(commit=commit))
+    assert collector._pause == collecting.FLUSH_SECONDS
+    collector._commit()
+    assert collector._pause == pytest.approx(2.0 / 0.01)
 
 
 def test_a_signal_may_come_in_the_middle_of_printing(capfd):

@@ -9,7 +9,7 @@ import pytest
 import xarray
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.engine.static_track import StaticTrack
 from tiengine.kernels import layout as at
 from tiengine.scenario.scenario import load_scenario
@@ -42,8 +42,8 @@ def balanced(name: str, *overrides: str, duration: float) -> tuple[March, NDArra
         The march, and forces [N], shape (steps, fastenings or inertia, vertical or lateral, rail).
     """
     model = model_of(name, *overrides, dt=2e-4)
-    k, n = model.window.wave_numbers, model.given.modes
-    whole = model.given.rail.mass_per_length * (1.0 - np.cos(k * model.given.length)) / k
+    k, n = model.window.wave_numbers, model.ingredients.modes
+    whole = model.ingredients.rail.mass_per_length * (1.0 - np.cos(k * model.ingredients.length)) / k
     rows = []
 
     def each(_: int, stepper) -> None:
@@ -62,7 +62,7 @@ def test_smooth_track_settles_to_the_static_load(smooth):
     0.01 % for a mean over a number of steps that is not exactly one of slabs.
     """
     run, _ = smooth
-    train = run.model.given.train
+    train = run.model.ingredients.train
     weight = train.gravity[1 : train.n_dof : 5].sum()
     whole_slabs = round(10 * SLAB_PITCH / SPEED / 2e-4)
     np.testing.assert_allclose(run.vertical[-whole_slabs:].mean(axis=0), weight / 8.0, rtol=1e-4)
@@ -92,7 +92,7 @@ def test_ripple_has_the_size_of_the_tracks_contrast(smooth):
     """
     run, _ = smooth
     model = run.model
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     deflection = []
     for X in np.linspace(0.5 * SEAT_PITCH, 1.5 * SEAT_PITCH, 8, endpoint=False):
         state.enter(model, 1, 0)
@@ -141,7 +141,7 @@ def test_fastenings_and_inertia_carry_the_wheels_on_a_rough_track():
 def test_wheels_carry_the_train_and_its_inertia():
     """Newton's law for all bodies together, vertically and laterally, at every step: rounding only."""
     run = march("default", dt=2e-4, duration=0.4)
-    train = run.model.given.train
+    train = run.model.ingredients.train
     mass, weight = np.diag(train.M)[: train.n_dof], train.gravity[1 : train.n_dof : 5].sum()
     acceleration = run.body[:, 2]
     down = acceleration[:, 1::5] @ mass[1::5]

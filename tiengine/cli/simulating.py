@@ -106,7 +106,7 @@ def _watched(simulation: Callable[..., Result], path: Path, name: str, quiet: bo
         try:
             with _progress(console, name) as progress:
                 result = simulation(
-                    progress=progress, tell=lambda words: console.print(words, markup=False), stop=lambda: stop.asked
+                    progress=progress, notify=lambda words: console.print(words, markup=False), stop=lambda: stop.asked
                 )
         except RunStoppedError as stopped:
             how = f"go on by: tiengine resume {path}" if path.exists() else "nothing was computed yet"

@@ -1,4 +1,4 @@
-"""What a measurement was made with: versions, processor, caches, memory.
+"""Circumstances of a measurement: versions, processor, caches, memory.
 
 Processor and caches are read from Linux's own files. The libraries for it start a child process, which hangs when it is
 forked after Taichi has begun; on other systems the caches stay unknown.
@@ -77,10 +77,10 @@ def import_seconds() -> float:
 
 
 def cache_bytes(folder: Path) -> dict[int, int]:
-    """Sizes of data and unified caches by level; empty where the system does not say.
+    """Sizes of data and unified caches by level; empty where the system does not describe them.
 
     Args:
-        folder: Where Linux describes the caches of a core.
+        folder: Folder in which Linux describes the caches of a core.
     """
     found = {}
     for each in sorted(folder.glob("index*")):
@@ -99,7 +99,7 @@ def _cpu() -> str:
 
 
 def _blas() -> str:
-    """NumPy's BLAS, the one that solves."""
+    """Name and version of NumPy's BLAS, which does the products of the step."""
     libraries = [each for each in threadpool_info() if each["user_api"] == "blas"]
     own = [each for each in libraries if "numpy" in each["filepath"]] or libraries
     return f"{own[0]['internal_api']} {own[0]['version']} ({own[0].get('architecture', '?')})" if own else "unknown"

@@ -28,6 +28,7 @@ from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
 from tiengine.track.defects import check_defects
+from tiengine.vehicle.train import centre_in_window
 
 __all__ = ["Scenario", "check_wavelength", "duration", "load_scenario", "to_toml"]
 
@@ -84,9 +85,8 @@ class Scenario(Params):
 
     @cached_property
     def centre_in_window(self) -> float:
-        """Distance of the first vehicle's centre from the window's rear end [m]; the wheels' span is centred."""
-        x = self.parts.wheelset_positions
-        return self.window_length / 2.0 - 0.5 * float(x.max() + x.min())
+        """Centre of the first vehicle from the window's rear end [m]: the wheels stand in its middle."""
+        return centre_in_window(self.window_length, self.parts.wheelset_positions)
 
     @cached_property
     def modes(self) -> int:

@@ -1,9 +1,9 @@
-"""Which trains of an ensemble are advanced together.
+"""Tasks: trains of an ensemble that are advanced together.
 
 Trains that share everything but their irregularity share matrices, clock and seat phase: they form a group. A group is
-cut into tasks of equal size, the last filled up with copies of its last train, which are not written. Tasks follow
+cut into tasks of equal size; the last task is padded with copies of its last train, which are not written. Tasks follow
 from the scenario alone: BLAS adds in an order that depends on the number of right-hand sides, so that the bits of a
-train depend on how many stand beside it, but neither on which they are nor on who computes them.
+train depend on the number of trains in its task, but neither on which they are nor on the process that computes them.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ class Task:
     """Trains that are advanced together.
 
     Attributes:
-        number: Of the task, from 0.
-        scenario: The first train's; the others differ in their irregularity alone.
+        number: Number of the task, from 0.
+        scenario: Scenario of the first train; the others differ in their irregularity alone.
         trains: Numbers of the trains in the ensemble.
-        tracks: Irregularity of every train, then of those that fill up the task.
+        tracks: Irregularity of every train, then of the copies that pad the task.
         functions: Functions that give the tracks; empty where none does.
     """
 
@@ -43,7 +43,7 @@ class Task:
 
     @property
     def size(self) -> int:
-        """Trains advanced together, those that fill up included."""
+        """Trains advanced together, copies included."""
         return len(self.tracks)
 
 
@@ -94,9 +94,9 @@ def _tasks(
     tasks: list[Task] = []
     for first in range(0, len(group), size):
         trains = tuple(group[first : first + size])
-        filled = (*trains, *(trains[-1],) * (size - len(trains)))
-        tracks = tuple(members[i].irregularity for i in filled)
-        given = tuple(functions[i] for i in filled if functions)
+        padded = (*trains, *(trains[-1],) * (size - len(trains)))
+        tracks = tuple(members[i].irregularity for i in padded)
+        given = tuple(functions[i] for i in padded if functions)
         tasks.append(Task(number + len(tasks), members[trains[0]], trains, tracks, given))
     return tasks
 
@@ -104,5 +104,5 @@ def _tasks(
 def _shared(train: Scenario) -> str:
     """Text that is the same for trains of one group: the irregularity's shortest wave matters to the time step."""
     shortest = shortest_wavelength(train.irregularity)
-    rest = train.model_copy(update={"irregularity": IrregularityParams(), "presets": {}})
-    return f"{shortest!r}\n{to_toml(rest)}"
+    others = train.model_copy(update={"irregularity": IrregularityParams(), "presets": {}})
+    return f"{shortest!r}\n{to_toml(others)}"

@@ -107,6 +107,15 @@ class Slab(Params):
         """Distance between joints, length + gap [m]."""
         return self.length + self.gap
 
+    def slots(self, window: float, cover: bool) -> int:
+        """Slabs to keep in memory under a window: the paper's Eq. (16), or all that a moving window can touch.
+
+        Args:
+            window: Length [m].
+            cover: One slab more than the paper's count, so that every seat of the window stands on one.
+        """
+        return int(np.floor(window / self.pitch)) + (2 if cover else 1)
+
     @property
     def mass(self) -> float:
         """Mass of the slab [kg]."""

@@ -28,7 +28,7 @@ from tiengine.vehicle.assembly import Assembly, Element, PlacedBody, longitudina
 from tiengine.vehicle.connector import extend_table
 from tiengine.vehicle.vehicle import Vehicle
 
-__all__ = ["MOTIONS", "TrainModel", "assemble", "static_wheel_loads", "train_centres"]
+__all__ = ["MOTIONS", "TrainModel", "assemble", "centre_in_window", "static_wheel_loads", "train_centres"]
 
 MOTIONS = ("y", "z", "roll", "pitch", "yaw")
 """Order of a body's coordinates."""
@@ -93,6 +93,16 @@ class TrainModel:
     def dof(self, body: str, motion: str) -> int:
         """Return the index of a coordinate of a body, e.g. ``dof("car", "z")``."""
         return 5 * self.body_names.index(body) + MOTIONS.index(motion)
+
+
+def centre_in_window(window: float, wheelset_x: NDArray[np.float64]) -> float:
+    """Centre of the first vehicle from the rear end of a window that has the wheels in its middle [m].
+
+    Args:
+        window: Length [m].
+        wheelset_x: Wheelsets relative to the first vehicle's centre [m], shape (n_ws,).
+    """
+    return window / 2.0 - 0.5 * float(wheelset_x.max() + wheelset_x.min())
 
 
 def train_centres(vehicles: Sequence[Vehicle]) -> NDArray[np.float64]:

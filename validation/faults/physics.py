@@ -118,16 +118,14 @@ def _spoiled(change: Change, block: str, train: int, crossed: list[float], dt: f
         state, stepper = run.stepper.state, run.stepper
 
         def spoil() -> None:
-            done = run.done + stepper.asked[0] + 1
+            done = run.done + stepper.rows.step + 1
             change(state, done)
             if not crossed and not all(
-                bool((np.abs(state.view(row, block)[train]) < limit).all()) for row, limit in LIMITS.items()
+                bool((np.abs(rows) < limit).all()) for rows, limit in zip(state.part(train, block), LIMITS, strict=True)
             ):
                 crossed.append(done * dt)
 
-        *before, guard = stepper.stages
-        assert guard[0] == "guards", guard[0]
-        stepper.stages = (*before, ("faults", spoil), guard)
+        stepper.watch("faults", spoil, before="guards")
         return run
 
     march.Run.begin = staticmethod(spoiled)  # type: ignore[method-assign,assignment]
