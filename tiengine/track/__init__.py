@@ -1,0 +1,1 @@
+"""Rails, fastenings and slabs: parameters and host matrices."""
