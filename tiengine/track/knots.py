@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -70,7 +71,7 @@ def graded_knots(length: float, wheel_s: NDArray[np.float64], grading: Grading |
     wheels = wheels[np.append(True, np.diff(wheels) >= sliver)]
     rear, front = _outward(wheels[0], grading), _outward(length - wheels[-1], grading)
     parts = [wheels[0] - rear[::-1]]
-    for a, b in zip(wheels[:-1], wheels[1:], strict=True):
+    for a, b in pairwise(wheels):
         parts.append(_between(a, b, grading)[1:])
     parts.append(wheels[-1] + front[1:])
     knots = np.concatenate(parts)
@@ -100,6 +101,7 @@ def _between(a: float, b: float, grading: Grading) -> NDArray[np.float64]:
     half = float(grading.spans(np.array(0.5 * (b - a))))
     spans = _whole(2.0 * half)
     number = np.arange(spans + 1)
-    from_nearest = grading.distance(2.0 * half / spans * np.minimum(number, spans - number))
+    nearest = np.minimum(number, spans - number).astype(np.float64)
+    from_nearest = grading.distance(2.0 * half / spans * nearest)
     knots: NDArray[np.float64] = np.where(2 * number <= spans, a + from_nearest, b - from_nearest)
     return knots

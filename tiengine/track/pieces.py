@@ -54,7 +54,7 @@ class Pieces:
     @property
     def width(self) -> int:
         """Functions on a piece."""
-        return self.coefficients.shape[1]
+        return int(self.coefficients.shape[1])
 
     def locate(self, s: NDArray[np.float64]) -> NDArray[np.int64]:
         """Piece of every place, that ahead of a break; the last one at the front end."""

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,8 +30,8 @@ from tiengine.track.trial_functions import FieldProducts, TrialFunctions
 __all__ = ["LATERAL_FIELDS", "VERTICAL_FIELDS", "RailOperators", "interleaved"]
 
 VERTICAL_FIELDS, LATERAL_FIELDS = 2, 3
-Block = sp.csr_array | None
-Matrices = tuple[sp.csr_array, sp.csr_array, sp.csr_array]
+Block: TypeAlias = "sp.csr_array | None"
+Matrices: TypeAlias = "tuple[sp.csr_array, sp.csr_array, sp.csr_array]"
 
 
 def interleaved(blocks: Sequence[Sequence[Block]]) -> sp.csr_array:
@@ -42,15 +43,15 @@ def interleaved(blocks: Sequence[Sequence[Block]]) -> sp.csr_array:
     Returns:
         Shape (fields n, fields n).
     """
-    fields, parts = len(blocks), []
+    fields, n = len(blocks), next(block.shape[0] for row in blocks for block in row if block is not None)
+    total = sp.csr_array((fields * n, fields * n))
     for i, row in enumerate(blocks):
         for j, block in enumerate(row):
             if block is not None:
                 place = sp.coo_array(([1.0], ([i], [j])), shape=(fields, fields))
-                parts.append(sp.csr_array(sp.kron(sp.csr_array(block), place)))
-    total = sum(parts[1:], start=parts[0])
+                total = total + sp.csr_array(sp.kron(block, place))
     total.eliminate_zeros()
-    return sp.csr_array(total)
+    return total
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,7 +61,7 @@ class Splines:
 
     @cached_property
     def displacement(self) -> Pieces:
-        """phi by span."""
+        """Functions phi by span."""
         c = _b_splines(self.knots)
         # the end spans are moved by one function, past the one that is left out
         c[0], c[-1] = np.roll(c[0], -1, axis=0), np.roll(c[-1], 1, axis=0)
@@ -70,7 +70,7 @@ class Splines:
 
     @cached_property
     def slope(self) -> Pieces:
-        """psi by span."""
+        """Functions psi by span."""
         c = _b_splines(self.knots)
         head, tail = c[0].copy(), c[-1].copy()
         c[0] = [head[0] + head[1], head[2], head[3], np.zeros(POWERS)]
@@ -98,7 +98,9 @@ class Splines:
     @cached_property
     def products(self) -> Products:
         """Integrals of the functions, banded."""
-        phi, phi1, psi, psi1 = (p.coefficients @ self._powers(d) for p in (self.displacement, self.slope) for d in (0, 1))
+        phi, phi1, psi, psi1 = (
+            p.coefficients @ self._powers(d) for p in (self.displacement, self.slope) for d in (0, 1)
+        )
         return Products(
             FieldProducts(self._integral(phi, phi), self._integral(phi, phi1), self._integral(phi1, phi1)),
             FieldProducts(self._integral(psi, psi), self._integral(psi, psi1), self._integral(psi1, psi1)),
@@ -113,7 +115,7 @@ class Splines:
         return np.stack([np.ones_like(x), x, x**2, x**3], axis=1)
 
     def _integral(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> sp.csr_array:
-        """int a_i b_j ds of functions given at the Gauss points, shape (spans, 4, points) each."""
+        """Integral of a_i b_j ds of functions given at the Gauss points, shape (spans, 4, points) each."""
         weight = 0.5 * np.diff(self.knots)[:, None] * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]
         local = np.einsum("sig,sg,sjg->sij", a, weight, b)
         index = self._first[:, None] + np.arange(TOUCHED)
