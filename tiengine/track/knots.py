@@ -93,7 +93,7 @@ def _outward(distance: float, grading: Grading) -> NDArray[np.float64]:
     """Distances of knots from the outermost wheel to the window's end [m]; three spans at least."""
     total = float(grading.spans(np.array(distance)))
     spans = max(3, _whole(total))
-    return grading.distance(total / spans * np.arange(spans + 1))
+    return grading.distance(total / spans * np.arange(spans + 1.0))
 
 
 def _between(a: float, b: float, grading: Grading) -> NDArray[np.float64]:

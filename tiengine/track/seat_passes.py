@@ -13,7 +13,7 @@ is a table over s, since A is constant in the window.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,10 +24,15 @@ from scipy.sparse.linalg import splu
 from tiengine.fastening import Fastening
 from tiengine.track.rail_operators import RailOperators
 
-__all__ = ["SeatPasses"]
+__all__ = ["CONTRACTION", "FACTORS", "SeatPasses", "least_factor"]
 
 Reals = NDArray[np.float64]
 
+CONTRACTION = 0.9
+"""Spectral radius below which two passes a step are trusted to be stable (energy of free vibration, tests)."""
+FACTORS = (1.0, 2.0, 4.0)
+"""Of the smeared seats, the least first: a larger one slows the passes down."""
+PHASES = 4  # places of the seats in a pitch at which the passes are tried
 ITERATIONS = 60  # of the power method: the modulus of the largest eigenvalue to a few per cent
 
 
@@ -125,8 +130,18 @@ class SeatPasses:
         return w.toarray()[:, None], lateral
 
 
+def least_factor(passes: SeatPasses) -> float | None:
+    """Least factor of the smeared seats with which the passes contract well enough; none if no factor does."""
+    for factor in FACTORS:
+        tried = replace(passes, factor=factor)
+        seats = passes.spacing * (np.arange(PHASES) + 0.5) / PHASES
+        if max(tried.contraction(float(s)) for s in seats) <= CONTRACTION:
+            return factor
+    return None
+
+
 def _spectral_radius(rest: sp.csr_array, solve: Callable[[Reals], Reals]) -> float:
-    """Growth a pass in the long run, by the power method on two vectors (a pair of complex eigenvalues)."""
+    """Growth a pass in the long run, by the power method on four vectors (complex pairs of eigenvalues)."""
     basis = np.random.Generator(np.random.Philox(key=0)).standard_normal((rest.shape[0], 4))
     size = 0.0
     for _ in range(ITERATIONS):

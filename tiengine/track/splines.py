@@ -12,7 +12,7 @@ phi_i and psi_i stand at the same place, so that the unknowns of a function side
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -39,6 +39,7 @@ class Splines:
     """
 
     knots: NDArray[np.float64]
+    _means: dict[float, Pieces] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check the knots.
@@ -85,7 +86,11 @@ class Splines:
 
     def seats(self, length: float) -> Pieces:
         """Mean of phi over a seat of a length [m] by the place of its middle; 0 for a point."""
-        return self.displacement if length == 0.0 else self.displacement.mean(*seat_points(length), self.count)
+        if length == 0.0:
+            return self.displacement
+        if length not in self._means:
+            self._means[length] = self.displacement.mean(*seat_points(length), self.count)
+        return self._means[length]
 
     def shape(self, s: NDArray[np.float64], derivative: int = 0, over: float = 0.0) -> NDArray[np.float64]:
         """See :class:`tiengine.track.trial_functions.TrialFunctions`; what lies beyond the ends counts as zero."""
