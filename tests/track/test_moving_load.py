@@ -1,4 +1,4 @@
-"""Loads and wheels that move over periodic seats: Floquet's solution, order of the step, passes against the exact one."""
+"""Loads and wheels that move over periodic seats: Floquet's solution, order of the step, passes against exact steps."""
 
 from __future__ import annotations
 
