@@ -129,14 +129,15 @@ def test_flow_is_skew_but_for_the_flux(splines):
 @pytest.mark.parametrize("derivative", [0, 1])
 def test_mean_over_a_seat(splines, length, derivative):
     """The table of means against five evaluations; what lies beyond the ends counts as zero."""
-    s, (offset, weight) = inner(splines), seat_points(length)
+    s, (offset, weight) = np.linspace(-0.1, splines.length + 0.1, 441), seat_points(length)
     expected = np.zeros((len(s), splines.count))
     for x, a in zip(offset, weight, strict=True):
         inside = (s + x >= 0.0) & (s + x <= splines.length)
         expected[inside] += a * splines.shape(s[inside] + x, derivative)
     found = splines.shape(s, derivative, length)
-    # at a break of the table a slope at the window's end belongs to either side
-    clear = np.abs(s[:, None] + offset - splines.length).min(axis=1) > 1e-9
+    # where a point passes an end the slope jumps
+    ends = np.array([0.0, splines.length])[:, None, None]
+    clear = np.abs(s[:, None] + offset - ends).min(axis=(0, 2)) > 1e-9
     np.testing.assert_allclose(found[clear], expected[clear], atol=1e-10 * np.abs(expected).max())
 
 
@@ -164,11 +165,13 @@ def test_lookup(length):
     pieces = Splines(KNOTS["graded"]).seats(length)
     lookup = pieces.lookup(0.05)
     rng = np.random.default_rng(1)
-    cells = lookup.cell * np.arange(len(lookup.start))
-    places = np.concatenate([rng.uniform(0.0, LENGTH, 4000), pieces.breaks[:-1], cells, np.nextafter(cells[1:], 0.0)])
+    rear = pieces.breaks[0]
+    cells = rear + lookup.cell * np.arange(len(lookup.start))
+    inside = rng.uniform(rear, pieces.breaks[-1], 4000)
+    places = np.concatenate([inside, pieces.breaks[:-1], cells, np.nextafter(cells[1:], -1.0)])
     most = 0
     for s in places:
-        p, steps = lookup.start[min(int(s / lookup.cell), len(lookup.start) - 1)], 0
+        p, steps = lookup.start[min(int((s - rear) / lookup.cell), len(lookup.start) - 1)], 0
         while p + 1 < len(pieces.first) and s >= pieces.breaks[p + 1]:
             p, steps = p + 1, steps + 1
         assert p == pieces.locate(np.array([s]))[0]

@@ -24,12 +24,12 @@ SLIVER = 1e-9  # m: breaks as close are one; the functions are C2, so that they 
 
 @dataclass(frozen=True, eq=False)
 class Lookup:
-    """From a place to its piece: start[int(s / cell)], then at most ``advances`` steps on while s >= breaks[p + 1].
+    """From a place to its piece p = start[int((s - breaks[0]) / cell)], then on while s >= breaks[p + 1].
 
     Attributes:
         cell: Length of a cell [m].
         start: Piece at the rear end of every cell, shape (cells,).
-        advances: Most steps on.
+        advances: Most steps on that it takes.
     """
 
     cell: float
@@ -86,18 +86,18 @@ class Pieces:
         return out
 
     def mean(self, offset: NDArray[np.float64], weight: NDArray[np.float64], count: int) -> Pieces:
-        """Weighted mean over points around a place, as pieces over that place; zero beyond the ends.
+        """Weighted mean over points around a place, as pieces over that place.
+
+        Points beyond the ends count as zero; the table reaches as far out as one of them is still inside.
 
         Args:
-            offset: Points from the place [m], the place itself among them, shape (g,).
+            offset: Points from the place [m], on both sides of it, shape (g,).
             weight: Their weights, shape (g,).
             count: Functions in all.
         """
         low, high = self.breaks[0], self.breaks[-1]
-        edges = np.unique(np.append(np.subtract.outer(self.breaks, offset).ravel(), [low, high]))
-        edges = edges[(edges >= low) & (edges <= high)]
+        edges = np.unique(np.subtract.outer(self.breaks, offset))
         edges = edges[np.append(True, np.diff(edges) > SLIVER)]
-        edges[-1] = high
         at = 0.5 * (edges[1:] + edges[:-1])[:, None] + offset
         piece, inside = self.locate(at), (at > low) & (at < high)
         start = self.first[piece]
