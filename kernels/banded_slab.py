@@ -107,7 +107,7 @@ def linear_forces(
         a, b = ti.Vector.zero(ti.f64, 8), ti.Vector.zero(ti.f64, 8)
         k = start + i * 2 * (2 * K + 1)
         s = (base + i - K) * at.SLAB_ROWS
-        for q in ti.static(range(2 * K + 1)):
+        for q in range(2 * K + 1):
             a = a - coefficient[k + q] * slab[s + q * at.SLAB_ROWS + at.U_PREDICTED]
             b = b - coefficient[k + 2 * K + 1 + q] * slab[s + q * at.SLAB_ROWS + at.V_PREDICTED]
         o = (base + i) * at.SLAB_ROWS + at.LINEAR

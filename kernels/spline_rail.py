@@ -78,12 +78,12 @@ def forward(rail: Array, first: int, functions: int, coefficient: Array, initial
             for q in range(at.NEIGHBOURS):
                 j = k + (q - at.REACH) * at.RAIL_ROWS
                 m = c + at.LINEAR_START + q * at.N_LINEAR
-                for p in ti.static(range(len(at.STIFFNESS_PAIRS))):
+                for p in ti.static(range(at.N_STIFFNESS)):
                     f, g = ti.static(at.STIFFNESS_PAIRS[p])
                     a[f] = a[f] - coefficient[m + p] * rail[j + 5 * at.U_PREDICTED + g]
-                for p in ti.static(range(len(at.DAMPING_PAIRS))):
+                for p in ti.static(range(at.N_DAMPING)):
                     f, g = ti.static(at.DAMPING_PAIRS[p])
-                    d = coefficient[m + len(at.STIFFNESS_PAIRS) + p]
+                    d = coefficient[m + at.N_STIFFNESS + p]
                     a[f] = a[f] - d * rail[j + 5 * at.V_PREDICTED + g]
             for f in ti.static(range(5)):
                 rail[k + 5 * at.LINEAR + f] = a[f]

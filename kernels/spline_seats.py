@@ -147,7 +147,8 @@ def seat_forces(
             lateral = lateral + shape[m + at.SIDE_U] * foot + shape[m + at.SIDE_V] * dfoot
         moment = base2 * moment
         s = s0 + j * constants[layout.SPACING]
-        depth = ti.max(0.0, zone - ti.min(s, length - s)) / ti.max(zone, 1e-9)  # no zone: no depth
+        inside = ti.max(0.0, ti.min(s, length - s))  # a seat's middle may stand outside
+        depth = ti.max(0.0, zone - inside) / ti.max(zone, 1e-9)  # no zone: no depth
         ground = depth * depth  # to the ground: swallows waves before the window's end sends them back
         p = (c * size[at.SEATS] + j) * N_SEAT
         factor = seat[p + FACTOR]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,8 @@ from tiengine.model import Model
 from tiengine.train import TrainModel
 
 Floats = NDArray[np.float64]
+SINK = 2e-4
+"""m: presses the wheels on the rails."""
 
 
 def graded_knots(length: float, wheels: Floats, fine: float, coarse: float) -> Floats:
@@ -164,13 +165,11 @@ class Bed:
         for row in (sl.U, sl.V, sl.A):
             s.set_rails(row, rails[row])
             s.set_vehicles(row, cars[row])
-        sink = 6e-4  # presses the wheels on the rails
-        z = cars[sl.U]
-        z[:, self.model.given.train.wheelset_dof[:, 1]] += sink
+            z = cars[sl.U]
+        z[:, self.model.given.train.wheelset_dof[:, 1]] += SINK
         s.set_vehicles(sl.U, z)
 
 
-@cache
 def _slab_designs(model: Model) -> list[tuple[Floats, Floats, Floats]]:
     """A, K, C of every design, as ``tiengine.model`` makes them."""
     given = model.given
@@ -188,9 +187,33 @@ def _slab_designs(model: Model) -> list[tuple[Floats, Floats, Floats]]:
 def make_bed(
     model: Model, V: float, lanes: int | None = None, fine: float = 0.3, coarse: float = 1.0, steps: int = 8,
     passes: int = 2, pad: float = 0.15, X: float = 0.0,
+    absorbing: float = 0.0, residual: float = 0.0, soft: tuple[int, ...] = (), factors: bool = False,
+    tolerance: float | None = None,
 ) -> Bed:  # fmt: skip
-    """Everything for ``model.given.trains`` trains."""
-    given, c, train = model.given, model.constants, model.given.train
+    """Everything for ``model.given.trains`` trains.
+
+    Args:
+        model: Parts other than the rails.
+        V: Speed [m/s].
+        lanes: Of the rails' vectors; as many as the step takes by itself if None.
+        fine: Knots at the wheels [m].
+        coarse: Knots far away [m].
+        steps: Rows of the chunk.
+        passes: Passes a step.
+        pad: Length of a seat [m].
+        X: Chainage of the window's rear end [m].
+        absorbing: Length of the absorbing zones [m].
+        residual: Compliance under the wheels [m/N].
+        soft: Slots whose slab stands on half the bed, a design of its own.
+        factors: Fastenings with factors of their own, one failed.
+        tolerance: Of the contact in the last pass, relative to the static load; the model's if None.
+    """
+    given, train = model.given, model.given.train
+    c = model.constants.copy()
+    c[at.ABSORBING_ZONE] = absorbing
+    c[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1] = residual
+    c[at.CONTACT_TOLERANCE] = c[at.CONTACT_TOLERANCE] if tolerance is None else tolerance
+    model = replace(model, constants=c)
     B, W = given.trains, len(train.wheelset_x)
     knots = graded_knots(given.length, model.wheel_s, fine, coarse)
     rail = spline_rail(model, knots, V)
@@ -199,6 +222,8 @@ def make_bed(
     rails = RailTables.of(rail.vertical, rail.lateral, spans, model.wheel_s, beta_dt2, gamma_dt)
     first = given.designs.matrices[0]
     designs = _slab_designs(model)
+    A, K, C = designs[0]
+    designs.append((A - 0.5 * (beta_dt2 * K + gamma_dt * C), 0.5 * K, 0.5 * C))
     slabs = SlabTables.of(designs, c, first.seat_index, first.seat_w, first.seat_slope, first.seat_x)
     cars = CarTables.of(
         train.M, train.C + V * train.C_speed, train.K, np.stack([train.gravity, train.acceleration_force]),
@@ -207,6 +232,11 @@ def make_bed(
     seat_count = int(np.ceil((given.length + pad) / c[at.SPACING])) + 1
     seats = SeatTables.of(seat_count, pad, spans)
     state = SplineState.at_rest(B, lanes or lanes_for(B), rail.n, seat_count, W, given.slots, slabs, cars)
+    state.slab_design.reshape(state._whole, -1)[:, list(soft)] = len(designs) - 1
+    if factors:
+        given_factors = np.random.default_rng(3).uniform(0.5, 1.0, (B, seat_count, 2))
+        given_factors[:, seat_count // 2] = 0.0
+        state.set_seat_factors(given_factors)
     contact = Contact(
         wheel=model.wheel, table=given.contact.values, contact=np.zeros((B, W, 2, N_CONTACT)),
         force=np.zeros((B, W, 2, 4)), wheelset_force=np.zeros((B, W, 5)), rail_force=np.zeros((B, W, 2, 3)),
@@ -298,7 +328,8 @@ def reference_pass(
         slot = slab % slots
         first_slab = int(bed.clock[k, at.FIRST_SLAB])
         modelled = first_slab <= slab < first_slab + slots
-        depth = max(0.0, c[at.ABSORBING_ZONE] - min(s, given.length - s)) / max(c[at.ABSORBING_ZONE], 1e-9)
+        zone, away = c[at.ABSORBING_ZONE], max(0.0, min(s, given.length - s))
+        depth = max(0.0, zone - away) / zone if zone > 0.0 else 0.0
         for r in range(2):
             u, v = N @ at_iterate.rails[0, r], N @ at_iterate.rails[1, r] - bed.V * (D @ at_iterate.rails[0, r])
             V_pull = kv * u[0] + cv * v[0]

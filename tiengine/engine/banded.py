@@ -154,7 +154,7 @@ def rail_coefficients(
             out[:, at.INVERSE_DIAGONAL + start + f] = inverse[:, f]
         for matrix, pairs, offset, stride, name in (
             (block.K, at.STIFFNESS_PAIRS, at.LINEAR_START, at.N_LINEAR, "K"),
-            (block.C, at.DAMPING_PAIRS, at.LINEAR_START + len(at.STIFFNESS_PAIRS), at.N_LINEAR, "C"),
+            (block.C, at.DAMPING_PAIRS, at.LINEAR_START + at.N_STIFFNESS, at.N_LINEAR, "C"),
             (block.A_s, at.STAND_IN_PAIRS, at.STAND_IN_START, at.N_STAND_IN, "A_s"),
         ):
             _by_neighbour(matrix, block.held, start, fields, pairs, out, offset, stride, name)
