@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import taichi as ti
 from numpy.typing import NDArray
 from taichi.lang import impl
 
@@ -14,19 +13,7 @@ from tiengine.engine import vector_mode
 from tiengine.engine.aligned import aligned_copy, aligned_zeros, is_aligned
 from tiengine.engine.vector_mode import VectorLaunch
 
-
-def doubling(lanes: int) -> Any:
-    vectors = ti.types.ndarray(dtype=ti.types.vector(lanes, ti.f64), ndim=1)
-    numbers = ti.types.ndarray(dtype=ti.f64, ndim=1)
-
-    @ti.kernel
-    def double(x: vectors, factor: numbers):
-        ti.loop_config(serialize=True)
-        for i in range(factor.shape[0]):
-            x[i] = 2.0 * x[i] + factor[i] * x[i]
-            x[i][1] = x[i][0] - x[i][1]
-
-    return double
+from .vector_kernel import doubling
 
 
 def run(x: NDArray[np.float64]) -> tuple[VectorLaunch, NDArray[np.float64]]:
