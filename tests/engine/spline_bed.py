@@ -1,0 +1,405 @@
+"""A spline step on the parts of the scenario ``paper``, and the same step in NumPy, matrix by matrix."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from tiengine.engine.banded import BandedBlock
+from tiengine.engine.spline_arrays import CarTables, RailTables, SeatTables, SlabTables, Spans, SplineState, spans_of
+from tiengine.engine.spline_step import Contact, SplineStep, Suspension
+from tiengine.engine.vector_mode import lanes_for
+from tiengine.integrator import seat_inverse_terms, seat_shapes
+from tiengine.kernels import layout as at
+from tiengine.kernels import spline_layout as sl
+from tiengine.kernels.wheel_rail import COS, N_CONTACT
+from tiengine.model import Model
+from tiengine.train import TrainModel
+
+Floats = NDArray[np.float64]
+SINK = 2e-4
+"""m: presses the wheels on the rails."""
+
+
+def graded_knots(length: float, wheels: Floats, fine: float, coarse: float) -> Floats:
+    """Clamped knots, ``fine`` within 0.5 m of a wheel, growing by a fifth of the distance up to ``coarse``."""
+    s, inner = 0.0, [0.0]
+    while s < length:
+        away = max(0.0, float(np.abs(wheels - s).min()) - 0.5)
+        s += min(coarse, fine + 0.2 * away)
+        inner.append(s)
+    inner = list(np.array(inner) * (length / inner[-1]))
+    return np.array([0.0] * 3 + inner + [length] * 3)
+
+
+@dataclass(frozen=True, eq=False)
+class SplineRail:
+    """Matrices of a rail on clamped knots, pinned by holding the end functions of w, v, theta_x."""
+
+    knots: Floats
+    n: int
+    vertical: BandedBlock
+    lateral: BandedBlock
+
+
+def spline_rail(model: Model, knots: Floats, V: float) -> SplineRail:
+    """Galerkin matrices in their weak form; A_s smears the fastenings."""
+    rail, c = model.given.rail, model.constants
+    n = len(knots) - 4
+    breaks = knots[3 : n + 1]
+    x, weight = np.polynomial.legendre.leggauss(5)
+    half = 0.5 * np.diff(breaks)[:, None]
+    points, weights = ((breaks[:-1, None] + half) + half * x).ravel(), (half * weight).ravel()
+    spline = BSpline(knots, np.eye(n), 3)
+    N, D = sp.csr_array(spline(points)), sp.csr_array(spline.derivative()(points))
+    N.data[np.abs(N.data) < 1e-15] = 0.0
+    W = sp.diags_array(weights)
+    nn, nd, dd = N.T @ W @ N, N.T @ W @ D, D.T @ W @ D
+    mw, mty, mv, mtz, mtx = rail.densities
+    shear_w, shear_v = rail.kappa_vertical * rail.G * rail.A, rail.kappa_lateral * rail.G * rail.A
+    smeared_v = (c[at.BETA_DT2] * c[at.K_VERTICAL] + c[at.GAMMA_DT] * c[at.C_VERTICAL]) / c[at.SPACING]
+    smeared_l = (c[at.BETA_DT2] * c[at.K_LATERAL] + c[at.GAMMA_DT] * c[at.C_LATERAL]) / c[at.SPACING]
+    a, b2 = rail.arm_fastening, rail.half_base**2
+    ends = np.array([0, n - 1])
+    vertical = BandedBlock(
+        M=_interleave([[mw * nn, None], [None, mty * nn]]),
+        C=_interleave([[-2 * V * mw * nd, None], [None, -2 * V * mty * nd]]),
+        K=_interleave(
+            [[(shear_w - V**2 * mw) * dd, -shear_w * nd.T], [-shear_w * nd, shear_w * nn + (rail.E * rail.Iy - V**2 * mty) * dd]]
+        ),
+        A_s=_interleave([[smeared_v * nn, None], [None, 0.0 * nn]]),
+        held=2 * ends,
+    )
+    lateral = BandedBlock(
+        M=_interleave([[mv * nn, None, None], [None, mtz * nn, None], [None, None, mtx * nn]]),
+        C=_interleave([[-2 * V * m * nd if i == j else None for j, m in enumerate((mv, mtz, mtx))] for i in range(3)]),
+        K=_interleave(
+            [
+                [(shear_v - V**2 * mv) * dd, -shear_v * nd.T, None],
+                [-shear_v * nd, shear_v * nn + (rail.E * rail.Iz - V**2 * mtz) * dd, None],
+                [None, None, (rail.GK - V**2 * mtx) * dd],
+            ]
+        ),
+        A_s=_interleave(
+            [
+                [smeared_l * nn, None, -a * smeared_l * nn],
+                [None, 0.0 * nn, None],
+                [-a * smeared_l * nn, None, (a**2 * smeared_l + b2 * smeared_v) * nn],
+            ]
+        ),
+        held=np.concatenate([3 * ends, 3 * ends + 2]),
+    )
+    return SplineRail(knots, n, vertical, lateral)
+
+
+def _interleave(blocks: list[list[Any]]) -> sp.csr_array:
+    """Fields of a function side by side."""
+    fields, total = len(blocks), None
+    for f, row in enumerate(blocks):
+        for g, block in enumerate(row):
+            if block is not None:
+                unit = np.zeros((fields, fields))
+                unit[f, g] = 1.0
+                term = sp.csr_array(sp.kron(block, unit))
+                total = term if total is None else total + term
+    total.eliminate_zeros()
+    return sp.csr_array(total)
+
+
+def cars_of(train: TrainModel) -> list[NDArray[np.intp]]:
+    """Coordinates that hang together."""
+    linked = sp.csr_array((train.K != 0.0) | (train.C != 0.0) | (train.M != 0.0))
+    row = np.repeat(train.element_index[:, :1], train.element_index.shape[1], axis=1)
+    used = train.element_row != 0.0
+    elements = sp.coo_array((np.ones(used.sum()), (row[used], train.element_index[used])), shape=linked.shape)
+    count, number = sp.csgraph.connected_components(linked + elements.tocsr(), directed=False)
+    big = [np.flatnonzero(number == k) for k in range(count)]
+    # coordinates without any coupling (a wheelset's pitch) go with their body
+    cars = [list(part) for part in big if len(part) > 5]
+    for part in big:
+        if len(part) <= 5:
+            body = part[0] // 5 * 5
+            next(car for car in cars if any(body <= dof < body + 5 for dof in car)).extend(part)
+    return [np.array(sorted(car)) for car in cars]
+
+
+@dataclass(eq=False)
+class Bed:
+    """A bound step with all its parts."""
+
+    model: Model
+    rail: SplineRail
+    spans: Spans
+    wheel_s: Floats
+    V: float
+    state: SplineState
+    seats: SeatTables
+    slabs: SlabTables
+    rails: RailTables
+    contact: Contact
+    clock: Floats
+    irregularity: Floats
+    record: Floats
+    step: SplineStep
+    designs: list[tuple[Floats, Floats, Floats]]
+
+    def start(self, seed: int, kick: float = 1.0) -> None:
+        """Every coordinate of every train a small number of its own; the same for train b in any batch."""
+        s = self.state
+        rails = {row: np.zeros((s.trains, 2, s.functions, 5)) for row in (sl.U, sl.V, sl.A)}
+        cars = {row: np.zeros((s.trains, self.model.given.train.n)) for row in (sl.U, sl.V, sl.A)}
+        for b in range(s.trains):
+            rng = np.random.default_rng((seed, b))
+            for row, size in ((sl.U, 1e-4), (sl.V, 1e-2), (sl.A, 1.0)):
+                rails[row][b] = kick * size * rng.standard_normal((2, s.functions, 5))
+                for field in (0, 2, 4):
+                    rails[row][b][:, [0, -1], field] = 0.0
+                cars[row][b] = kick * 0.1 * size * rng.standard_normal(self.model.given.train.n)
+                view = s.slabs(row)[b]
+                view[...] = kick * 0.1 * size * rng.standard_normal(view.shape)
+        for row in (sl.U, sl.V, sl.A):
+            s.set_rails(row, rails[row])
+            s.set_vehicles(row, cars[row])
+            z = cars[sl.U]
+        z[:, self.model.given.train.wheelset_dof[:, 1]] += SINK
+        s.set_vehicles(sl.U, z)
+
+
+def _slab_designs(model: Model) -> list[tuple[Floats, Floats, Floats]]:
+    """A, K, C of every design, as ``tiengine.model`` makes them."""
+    given = model.given
+    seats = seat_shapes(given.designs.matrices[0])
+    out = []
+    for slab, scale in zip(given.designs.matrices, given.designs.seat_scale, strict=True):
+        K = slab.K_plate if given.explicit_mortar else slab.K_plate + slab.K_bed
+        C = np.zeros_like(K) if given.explicit_mortar else slab.C_bed
+        own_K, own_C = seat_inverse_terms(seats, scale, given.fastening, given.rail.half_base)
+        A = given.newmark.operator(sp.csr_array(slab.M), sp.csr_array(C + own_C), sp.csr_array(K + own_K)).toarray()
+        out.append((A, K, C))
+    return out
+
+
+def make_bed(
+    model: Model, V: float, lanes: int | None = None, fine: float = 0.3, coarse: float = 1.0, steps: int = 8,
+    passes: int = 2, pad: float = 0.15, X: float = 0.0,
+    absorbing: float = 0.0, residual: float = 0.0, soft: tuple[int, ...] = (), factors: bool = False,
+    tolerance: float | None = None,
+) -> Bed:  # fmt: skip
+    """Everything for ``model.given.trains`` trains.
+
+    Args:
+        model: Parts other than the rails.
+        V: Speed [m/s].
+        lanes: Of the rails' vectors; as many as the step takes by itself if None.
+        fine: Knots at the wheels [m].
+        coarse: Knots far away [m].
+        steps: Rows of the chunk.
+        passes: Passes a step.
+        pad: Length of a seat [m].
+        X: Chainage of the window's rear end [m].
+        absorbing: Length of the absorbing zones [m].
+        residual: Compliance under the wheels [m/N].
+        soft: Slots whose slab stands on half the bed, a design of its own.
+        factors: Fastenings with factors of their own, one failed.
+        tolerance: Of the contact in the last pass, relative to the static load; the model's if None.
+    """
+    given, train = model.given, model.given.train
+    c = model.constants.copy()
+    c[at.ABSORBING_ZONE] = absorbing
+    c[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1] = residual
+    c[at.CONTACT_TOLERANCE] = c[at.CONTACT_TOLERANCE] if tolerance is None else tolerance
+    model = replace(model, constants=c)
+    B, W = given.trains, len(train.wheelset_x)
+    knots = graded_knots(given.length, model.wheel_s, fine, coarse)
+    rail = spline_rail(model, knots, V)
+    spans = spans_of(knots)
+    beta_dt2, gamma_dt = given.newmark.beta_dt2, given.newmark.gamma_dt
+    rails = RailTables.of(rail.vertical, rail.lateral, spans, model.wheel_s, beta_dt2, gamma_dt)
+    first = given.designs.matrices[0]
+    designs = _slab_designs(model)
+    A, K, C = designs[0]
+    designs.append((A - 0.5 * (beta_dt2 * K + gamma_dt * C), 0.5 * K, 0.5 * C))
+    slabs = SlabTables.of(designs, c, first.seat_index, first.seat_w, first.seat_slope, first.seat_x)
+    cars = CarTables.of(
+        train.M, train.C + V * train.C_speed, train.K, np.stack([train.gravity, train.acceleration_force]),
+        cars_of(train), train.wheelset_dof, train.element_index, beta_dt2, gamma_dt,
+    )  # fmt: skip
+    seat_count = int(np.ceil((given.length + pad) / c[at.SPACING])) + 1
+    seats = SeatTables.of(seat_count, pad, spans)
+    state = SplineState.at_rest(B, lanes or lanes_for(B), rail.n, seat_count, W, given.slots, slabs, cars)
+    state.slab_design.reshape(state._whole, -1)[:, list(soft)] = len(designs) - 1
+    if factors:
+        given_factors = np.random.default_rng(3).uniform(0.5, 1.0, (B, seat_count, 2))
+        given_factors[:, seat_count // 2] = 0.0
+        state.set_seat_factors(given_factors)
+    contact = Contact(
+        wheel=model.wheel, table=given.contact.values, contact=np.zeros((B, W, 2, N_CONTACT)),
+        force=np.zeros((B, W, 2, 4)), wheelset_force=np.zeros((B, W, 5)), rail_force=np.zeros((B, W, 2, 3)),
+        iterations=np.zeros((B, W), dtype=np.int32),
+    )  # fmt: skip
+    contact.contact[..., COS] = 1.0
+    clock = np.zeros((steps, at.N_CLOCK))
+    x = X + V * given.newmark.dt * np.arange(1, steps + 1)
+    rear = np.maximum(np.floor((x - pad / 2) / c[at.SPACING] - 0.5).astype(int) + 1, 0)
+    clock[:, at.POSITION], clock[:, at.SPEED], clock[:, at.FIRST_SEAT] = x, V, rear
+    clock[:, at.FIRST_SEAT_S] = (rear + 0.5) * c[at.SPACING] - x
+    clock[:, at.FIRST_SLAB] = np.floor(x / given.slab.pitch)
+    irregularity = np.zeros((B, steps, W, at.N_IRREGULARITY))
+    for b in range(B):
+        irregularity[b] = 1e-4 * np.random.default_rng((7, b)).standard_normal((steps, W, at.N_IRREGULARITY))
+    record = np.zeros((B, steps, W, 2, at.N_WHEEL))
+    step = SplineStep(
+        state, model.dims, c, passes, rails, spans, seats, slabs,
+        Suspension(train.element_row, train.element_kind, train.element_linear, train.element_table), contact, clock,
+        irregularity, record,
+    )  # fmt: skip
+    return Bed(
+        model, rail, spans, model.wheel_s, V, state, seats, slabs, rails, contact, clock, irregularity, record, step,
+        designs,
+    )  # fmt: skip
+
+
+@dataclass(eq=False)
+class Motion:
+    """u, v, a of one train: rails (2, n, 5), slabs (slots, N), train (n,)."""
+
+    rails: Floats
+    slabs: Floats
+    train: Floats
+
+
+def motion_of(bed: Bed, b: int) -> Motion:
+    """The present state of train b, rows u, v, a first in every array."""
+    s = bed.state
+    rows = (sl.U, sl.V, sl.A)
+    slots = bed.model.given.slots
+    return Motion(
+        np.stack([s.rails(row)[b] for row in rows]),
+        np.stack([s.slabs(row)[b].reshape(-1, s.slab_dofs)[:slots] for row in rows]),
+        np.stack([s.vehicles(row)[b] for row in rows]),
+    )
+
+
+def reference_pass(
+    bed: Bed, b: int, start: Motion, iterate: Motion | None, rail_force: Floats, wheelset_force: Floats, k: int = 0
+) -> Motion:
+    """One pass of step k by dense algebra, with given contact forces.
+
+    Args:
+        bed: The parts.
+        b: Train, for the factors of its fastenings and the designs of its slabs.
+        start: State at t_n.
+        iterate: State after the pass before; None in the first pass.
+        rail_force: On w, v, theta_x under the wheels, shape (W, 2, 3).
+        wheelset_force: On y, z, roll, pitch, yaw, shape (W, 5).
+        k: Step.
+    """
+    given, c, train = bed.model.given, bed.model.constants, bed.model.given.train
+    newmark = given.newmark
+    P = newmark.predictor
+    tilde = Motion(*(np.tensordot(P, rows, 1) for rows in (start.rails, start.slabs, start.train)))
+    at_iterate = iterate or Motion(*(np.concatenate([rows, 0 * rows[:1]]) for rows in (tilde.rails, tilde.slabs, tilde.train)))
+    spline = BSpline(bed.rail.knots, np.eye(bed.rail.n), 3)
+    slope_of = spline.derivative()
+    seat_map = seat_shapes(given.designs.matrices[0]).reshape(bed.state.slab_dofs, 5, -1)
+    kv, cv, kl, cl = (c[i] for i in (at.K_VERTICAL, at.C_VERTICAL, at.K_LATERAL, at.C_LATERAL))
+    arm, b2 = c[at.ARM_FASTENING], c[at.HALF_BASE] ** 2
+    n, slots, per_slab = bed.rail.n, given.slots, given.slab.fastenings
+    x_gauss, w_gauss = bed.seats.point.T
+    factors = bed.state.seats(12, 1)[b, :, 0]
+    designs = bed.state.slab_design.reshape(bed.state._whole, -1)[b]
+    F_rail = np.zeros((2, n, 5))
+    F_slab = np.zeros((slots, bed.state.slab_dofs))
+    forces = np.zeros((2, 3, len(bed.seats.place)))
+    for j in range(len(bed.seats.place)):
+        s = bed.clock[k, at.FIRST_SEAT_S] + j * c[at.SPACING]
+        inside = (s + x_gauss >= 0.0) & (s + x_gauss <= given.length)
+        if not inside.any():
+            continue
+        N = w_gauss[inside] @ spline(s + x_gauss[inside])
+        D = w_gauss[inside] @ slope_of(s + x_gauss[inside])
+        index = int(bed.clock[k, at.FIRST_SEAT]) + j
+        slab, seat = divmod(index, per_slab)
+        slot = slab % slots
+        first_slab = int(bed.clock[k, at.FIRST_SLAB])
+        modelled = first_slab <= slab < first_slab + slots
+        zone, away = c[at.ABSORBING_ZONE], max(0.0, min(s, given.length - s))
+        depth = max(0.0, zone - away) / zone if zone > 0.0 else 0.0
+        for r in range(2):
+            u, v = N @ at_iterate.rails[0, r], N @ at_iterate.rails[1, r] - bed.V * (D @ at_iterate.rails[0, r])
+            V_pull = kv * u[0] + cv * v[0]
+            L_pull = kl * (u[2] - arm * u[4]) + cl * (v[2] - arm * v[4])
+            M_pull = b2 * (kv * u[4] + cv * v[4])
+            rail = np.array([V_pull, L_pull, M_pull])
+            ground = []
+            for of in (tilde, at_iterate):
+                motion = np.stack([seat_map[:, :, seat].T @ of.slabs[m, slot] for m in range(2)]) * modelled
+                ground.append(
+                    [
+                        kv * motion[0, r] + cv * motion[1, r],
+                        kl * motion[0, 4] + cl * motion[1, 4],
+                        b2 * (kv * motion[0, 2 + r] + cv * motion[1, 2 + r]),
+                    ]
+                )
+            on_slab = factors[r, j] * (rail - ground[0])
+            F = factors[r, j] * (rail - ground[1]) + depth**2 * rail
+            forces[r, :, j] = F[0], F[1], F[2] - arm * F[1]
+            F_rail[r, :, 0] -= N * F[0]
+            F_rail[r, :, 2] -= N * F[1]
+            F_rail[r, :, 4] -= N * (F[2] - arm * F[1])
+            if modelled:
+                maps = seat_map[:, :, seat]
+                F_slab[slot] += maps[:, r] * on_slab[0] + maps[:, 4] * on_slab[1] + maps[:, 2 + r] * on_slab[2]
+    for w, s in enumerate(bed.wheel_s):
+        N = spline(s)
+        for r in range(2):
+            for m, field in enumerate((0, 2, 4)):
+                F_rail[r, :, field] += N * rail_force[w, r, m]
+    a_rail = np.zeros((2, n, 5))
+    for block, fields in ((bed.rail.vertical, slice(0, 2)), (bed.rail.lateral, slice(2, 5))):
+        A = block.operator(newmark.beta_dt2, newmark.gamma_dt).toarray()
+        free = np.setdiff1d(np.arange(len(A)), block.held)
+        for r in range(2):
+            u, v, a = (m[r, :, fields].ravel() for m in (tilde.rails[0], tilde.rails[1], at_iterate.rails[2]))
+            F = F_rail[r, :, fields].ravel() - block.C @ v - block.K @ u + block.A_s @ a
+            x = np.zeros(len(A))
+            x[free] = np.linalg.solve(A[np.ix_(free, free)], F[free])
+            a_rail[r, :, fields] = x.reshape(n, -1)
+    a_slab = np.zeros_like(F_slab)
+    for slot in range(slots):
+        A, K, C = bed.designs[int(designs[slot])]
+        a_slab[slot] = np.linalg.solve(A, F_slab[slot] - K @ tilde.slabs[0, slot] - C @ tilde.slabs[1, slot])
+    F = train.gravity + 0.0
+    v = at_iterate.train[1]
+    for w, dof in enumerate(train.wheelset_dof):
+        F[dof] += wheelset_force[w]
+        J = train.wheelset_spin_inertia[w]
+        F[dof[2]] += J * v[dof[3]] * v[dof[4]]
+        F[dof[4]] -= J * v[dof[3]] * v[dof[2]]
+    for e in range(len(train.element_kind)):
+        q = train.element_row[e] @ at_iterate.train[1 - train.element_kind[e], train.element_index[e]]
+        points = train.element_table[e]
+        last = (points[-1, 1] - points[-2, 1]) / (points[-1, 0] - points[-2, 0])
+        force = np.interp(abs(q), points[:, 0], points[:, 1]) + last * max(0.0, abs(q) - points[-1, 0])
+        np.subtract.at(F, train.element_index[e], train.element_row[e] * (np.sign(q) * force - train.element_linear[e] * q))
+    C = train.C + bed.V * train.C_speed
+    A = train.M + newmark.gamma_dt * C + newmark.beta_dt2 * train.K
+    a_train = np.linalg.solve(A, F - C @ tilde.train[1] - train.K @ tilde.train[0])
+    return Motion(
+        *(
+            np.stack([t[0] + newmark.beta_dt2 * a, t[1] + newmark.gamma_dt * a, a])
+            for t, a in ((tilde.rails, a_rail), (tilde.slabs, a_slab), (tilde.train, a_train))
+        )
+    )
+
+
+def with_trains(model: Model, trains: int) -> Model:
+    """The same model for another number of trains (dims only)."""
+    dims = model.dims.copy()
+    dims[at.TRAINS] = trains
+    return replace(model, given=replace(model.given, trains=trains), dims=dims)
