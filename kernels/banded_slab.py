@@ -13,7 +13,16 @@ from tiengine.kernels.types import Array, Template
 
 
 @ti.func
-def predict(slab: Array, base: int, dofs: int, numbers: Array, constants: Array):
+def felt(i: int, dofs: int, u: Template, v: Template, constants: Array):
+    """k u + c v of one coordinate as its fastenings feel it; the last two coordinates are lateral."""
+    k, c = constants[layout.K_VERTICAL], constants[layout.C_VERTICAL]
+    if i >= dofs - 2:
+        k, c = constants[layout.K_LATERAL], constants[layout.C_LATERAL]
+    return k * u + c * v
+
+
+@ti.func
+def predict(slab: Array, base: int, dofs: int, constants: Array):
     """Newmark's predictors of a group, and its k u + c v in SLAB_PULL; ``base`` is its first coordinate's place."""
     dt, beta_dt2, gamma_dt = constants[layout.DT], constants[layout.BETA_DT2], constants[layout.GAMMA_DT]
     half, rest = 0.5 * dt * dt - beta_dt2, dt - gamma_dt
@@ -23,7 +32,7 @@ def predict(slab: Array, base: int, dofs: int, numbers: Array, constants: Array)
         u = slab[k + at.U] + dt * v + half * a
         v = v + rest * a
         slab[k + at.U_PREDICTED], slab[k + at.V_PREDICTED] = u, v
-        slab[k + at.SLAB_PULL] = numbers[2 * i] * u + numbers[2 * i + 1] * v
+        slab[k + at.SLAB_PULL] = felt(i, dofs, u, v, constants)
 
 
 @ti.func
@@ -97,8 +106,9 @@ def coupled(coefficient: Array, k: int, near: Template, K: Template):
 
 @ti.func
 def linear_forces(
-    slab: Array, base: int, dofs: int, start: int, coefficient: Array, designs: Template, design: float, K: Template
-):
+    slab: Array, base: int, dofs: int, start: int, coefficient: Array, mixed: Template, designs: Template,
+    design: float, K: Template,
+):  # fmt: skip
     """-(C v~ + K u~) of a group into LINEAR, by the rows of K and C from ``start`` on, shape (N, 2, 2K + 1).
 
     Other arguments as in :func:`solve`.
@@ -110,16 +120,24 @@ def linear_forces(
         for q in range(2 * K + 1):
             a = a - coefficient[k + q] * slab[s + q * at.SLAB_ROWS + at.U_PREDICTED]
             b = b - coefficient[k + 2 * K + 1 + q] * slab[s + q * at.SLAB_ROWS + at.V_PREDICTED]
-        o = (base + i) * at.SLAB_ROWS + at.LINEAR
-        slab[o] = ti.select(designs == design, a + b, slab[o])
+        keep(slab, (base + i) * at.SLAB_ROWS + at.LINEAR, a + b, mixed, designs, design)
+
+
+@ti.func
+def keep(slab: Array, place: int, x: Template, mixed: Template, designs: Template, design: float):
+    """Store a vector, in a mixed group only the lanes of one design."""
+    if ti.static(mixed == 1):
+        slab[place] = ti.select(designs == design, x, slab[place])
+    else:
+        slab[place] = x
 
 
 @ti.func
 def solve(
-    slab: Array, base: int, dofs: int, start: int, coefficient: Array, designs: Template, design: float,
-    numbers: Array, beta_dt2: float, gamma_dt: float, K: Template,
+    slab: Array, base: int, dofs: int, start: int, coefficient: Array, mixed: Template, designs: Template,
+    design: float, constants: Array, K: Template,
 ):  # fmt: skip
-    """A^-1 (LINEAR + SLAB_LOAD) of a group, and Newmark's correctors, in the lanes of one design.
+    """A^-1 (LINEAR + SLAB_LOAD) of a group, and Newmark's correctors.
 
     Args:
         slab: State of the slabs.
@@ -127,13 +145,13 @@ def solve(
         dofs: N.
         start: The design's L by rows, nearest first, 1/diagonal, U / diagonal; shape (N, 2K + 1) from here on.
         coefficient: Coefficients of all designs.
+        mixed: 1 if the group holds slabs of several designs.
         designs: Design in each lane, vector.
         design: The one whose lanes are filled.
-        numbers: k and c of what the fastenings feel of each coordinate, shape (N, 2) in a row.
-        beta_dt2: beta dt^2 [s^2].
-        gamma_dt: gamma dt [s].
+        constants: Numbers, see ``layout``.
         K: Half width of the band.
     """
+    beta_dt2, gamma_dt = constants[layout.BETA_DT2], constants[layout.GAMMA_DT]
     near = [ti.Vector.zero(ti.f64, 8) for _ in range(K)]
     for i in range(dofs):
         s = (base + i) * at.SLAB_ROWS
@@ -150,11 +168,10 @@ def solve(
         shift(near, a, K)
         u = slab[s + at.U_PREDICTED] + beta_dt2 * a
         v = slab[s + at.V_PREDICTED] + gamma_dt * a
-        slab[s + at.A] = ti.select(designs == design, a, slab[s + at.A])
-        slab[s + at.U] = ti.select(designs == design, u, slab[s + at.U])
-        slab[s + at.V] = ti.select(designs == design, v, slab[s + at.V])
-        pull = numbers[2 * i] * u + numbers[2 * i + 1] * v
-        slab[s + at.SLAB_PULL] = ti.select(designs == design, pull, slab[s + at.SLAB_PULL])
+        keep(slab, s + at.A, a, mixed, designs, design)
+        keep(slab, s + at.U, u, mixed, designs, design)
+        keep(slab, s + at.V, v, mixed, designs, design)
+        keep(slab, s + at.SLAB_PULL, felt(i, dofs, u, v, constants), mixed, designs, design)
 
 
 @ti.func

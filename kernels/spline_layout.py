@@ -73,8 +73,8 @@ SEATS_STAGE, PULL_STAGE, EXCHANGE_STAGE, SEAT_FORCE_STAGE = 1, 2, 4, 8
 FORWARD_STAGE, CONTACT_STAGE, BACKWARD_STAGE, SLAB_STAGE, CAR_STAGE, PREDICT_STAGE = 16, 32, 64, 128, 256, 512
 ALL_STAGES = 1023
 
-# Columns of a span of the knots: its rear and front end [m], then four functions' c0..c3 in s - rear end.
-SPAN_REAR, SPAN_FRONT, SPAN_POLYNOMIALS, N_SPAN = 0, 1, 2, 18
+# Columns of a span of the knots: its rear and front end [m], four functions' c0..c3 in s - rear end, the first's number.
+SPAN_REAR, SPAN_FRONT, SPAN_POLYNOMIALS, SPAN_FIRST, N_SPAN = 0, 1, 2, 18, 19
 
 # A seat touches at most so many functions.
 TOUCHED = 8

@@ -17,16 +17,20 @@ FIELDS = (2, 3)
 
 
 @ti.func
+def predict_function(rail: Array, k: int, dt: float, beta_dt2: float, gamma_dt: float):
+    """Newmark's predictors of the function whose vectors start at ``k``."""
+    half, rest = 0.5 * dt * dt - beta_dt2, dt - gamma_dt
+    for f in ti.static(range(5)):
+        v, a = rail[k + 5 * at.V + f], rail[k + 5 * at.A + f]
+        rail[k + 5 * at.U_PREDICTED + f] = rail[k + 5 * at.U + f] + dt * v + half * a
+        rail[k + 5 * at.V_PREDICTED + f] = v + rest * a
+
+
+@ti.func
 def predict(rail: Array, first: int, functions: int, dt: float, beta_dt2: float, gamma_dt: float):
     """Newmark's predictors of all functions; ``first`` is the first function's place."""
-    half = 0.5 * dt * dt - beta_dt2
-    rest = dt - gamma_dt
     for i in range(functions):
-        k = (first + i) * at.RAIL_ROWS
-        for f in ti.static(range(5)):
-            v, a = rail[k + 5 * at.V + f], rail[k + 5 * at.A + f]
-            rail[k + 5 * at.U_PREDICTED + f] = rail[k + 5 * at.U + f] + dt * v + half * a
-            rail[k + 5 * at.V_PREDICTED + f] = v + rest * a
+        predict_function(rail, (first + i) * at.RAIL_ROWS, dt, beta_dt2, gamma_dt)
 
 
 @ti.func
@@ -110,9 +114,14 @@ def forward(rail: Array, first: int, functions: int, coefficient: Array, initial
 
 @ti.func
 def backward(
-    rail: Array, first: int, functions: int, coefficient: Array, beta_dt2: float, gamma_dt: float, lanes: Template
-):
-    """Backward substitution of row FORWARD_RESULT to the acceleration, and Newmark's correctors."""
+    rail: Array, first: int, functions: int, coefficient: Array, dt: float, beta_dt2: float, gamma_dt: float,
+    ahead: int, lanes: Template,
+):  # fmt: skip
+    """Backward substitution of row FORWARD_RESULT to the acceleration, and Newmark's correctors.
+
+    ``ahead`` is 1 if the next step's predictors are to be made too, which saves it a way through memory. They are made
+    of the function before, from memory: from the numbers at hand the compiler would make other last bits.
+    """
     zero = ti.Vector.zero(ti.f64, lanes)
     near_vertical = [zero, zero, zero, zero, zero, zero]
     near_lateral = [zero, zero, zero, zero, zero, zero, zero, zero, zero]
@@ -132,6 +141,10 @@ def backward(
         substitute(lateral, near_lateral, 3, at.BACKWARD_START[:1:-1], c, coefficient)
         a = [vertical[1], vertical[0], lateral[2], lateral[1], lateral[0]]
         for f in ti.static(range(5)):
-            rail[k + 5 * at.A + f] = a[f]
-            rail[k + 5 * at.U + f] = rail[k + 5 * at.U_PREDICTED + f] + beta_dt2 * a[f]
-            rail[k + 5 * at.V + f] = rail[k + 5 * at.V_PREDICTED + f] + gamma_dt * a[f]
+            u = rail[k + 5 * at.U_PREDICTED + f] + beta_dt2 * a[f]
+            v = rail[k + 5 * at.V_PREDICTED + f] + gamma_dt * a[f]
+            rail[k + 5 * at.A + f], rail[k + 5 * at.U + f], rail[k + 5 * at.V + f] = a[f], u, v
+        if ahead == 1 and m > 0:
+            predict_function(rail, k + at.RAIL_ROWS, dt, beta_dt2, gamma_dt)
+    if ahead == 1:
+        predict_function(rail, first * at.RAIL_ROWS, dt, beta_dt2, gamma_dt)

@@ -15,26 +15,33 @@ from tiengine.kernels import spline_layout as at
 from tiengine.kernels.types import Array, Template
 
 # Vectors of a seat in ``seat``: forces on the rail F_V, F_L, roll moment M_b - a F_L; on the slab F_V, F_L, M_b; what
-# the slabs' motion takes off (vertical, lateral, moment) at the predictors, at the iterate; factor of the fastening.
-ON_RAIL, ON_SLAB, PULL_PREDICTED, PULL_ITERATE, FACTOR, N_SEAT = 0, 3, 6, 9, 12, 13
+# the slabs' motion takes off (vertical, lateral, moment) at the predictors, at the iterate; factor of the fastening;
+# smallest and largest force on the rail at a step's end since the host last set them.
+ON_RAIL, ON_SLAB, PULL_PREDICTED, PULL_ITERATE, FACTOR, SMALLEST, LARGEST, N_SEAT = 0, 3, 6, 9, 12, 13, 16, 19
 
 
 @ti.func
-def span_at(s: float, cell: float, span: Array, span_of_cell: Array):
-    """Span of the knots that holds s, from the uniform cells of a table."""
-    k = span_of_cell[ti.min(ti.cast(s / cell, ti.i32), span_of_cell.shape[0] - 1)]
-    while k < span.shape[0] - 1 and s > span[k, at.SPAN_FRONT]:
-        k += 1
-    return k
+def span_from(k: int, s: float, span: Array):
+    """Span of the knots that holds s, at or in front of span k."""
+    found = k
+    while found < span.shape[0] - 1 and s > span[found, at.SPAN_FRONT]:
+        found += 1
+    return found
 
 
 @ti.func
-def add_point(j: int, k: int, t: float, weight: float, curvature: float, place: Array, first: Array, span: Array, shape: Array):
+def first_function(k: int, span: Array):
+    """First of the four functions of a span."""
+    return ti.cast(span[k, at.SPAN_FIRST], ti.i32)
+
+
+@ti.func
+def add_point(j: int, k: int, t: float, weight: float, curvature: float, place: Array, span: Array, shape: Array):
     """Add the values and slopes at t in span k to a seat's shape: (value, slope) in its first two numbers.
 
     ``curvature`` is the mean square of the points' offsets, for a seat that lies in one span; else 0.
     """
-    start = (j * at.TOUCHED + first[k] - place[j, at.TOUCH_FIRST]) * at.N_SEAT_SHAPE
+    start = (j * at.TOUCHED + first_function(k, span) - place[j, at.TOUCH_FIRST]) * at.N_SEAT_SHAPE
     for f in ti.static(range(4)):
         c = at.SPAN_POLYNOMIALS + 4 * f
         c0, c1, c2, c3 = span[k, c], span[k, c + 1], span[k, c + 2], span[k, c + 3]
@@ -48,7 +55,7 @@ def add_point(j: int, k: int, t: float, weight: float, curvature: float, place: 
 @ti.func
 def seat_shapes(
     s0: float, first_seat: int, first_slab: int, slots: int, V: float, size: Array, dims: Array, constants: Array,
-    point: Array, span: Array, span_first: Array, span_of_cell: Array, place: Array, shape: Array,
+    point: Array, span: Array, place: Array, shape: Array,
 ):  # fmt: skip
     """Functions that each seat touches, its numbers for them, and its place on the slabs.
 
@@ -62,18 +69,15 @@ def seat_shapes(
         dims: Sizes, see ``layout``.
         constants: Numbers, see ``layout``.
         point: Offset [m] and weight of the Gauss points, ascending, shape (points, 2).
-        span: Ends and polynomials of the spans, shape (spans, N_SPAN).
-        span_first: First function of each span, shape (spans,).
-        span_of_cell: Span at the rear end of each uniform cell over the window, shape (cells,).
+        span: Ends, polynomials and first function of the spans, shape (spans, N_SPAN).
         place: Functions touched and place on the slabs, shape (seats, N_SEAT_PLACE); filled.
         shape: Numbers of each seat and function, shape (seats TOUCHED N_SEAT_SHAPE,); filled.
     """
     length = constants[layout.LENGTH]
-    cell = length / span_of_cell.shape[0]
     kv, cv = constants[layout.K_VERTICAL], constants[layout.C_VERTICAL]
     kl, cl = constants[layout.K_LATERAL], constants[layout.C_LATERAL]
     per_slab, points = dims[layout.SEATS_PER_SLAB], point.shape[0]
-    spread = 0.0
+    spread, reached = 0.0, 0
     for g in range(points):
         spread += point[g, 1] * point[g, 0] * point[g, 0]
     for j in range(size[at.SEATS]):
@@ -81,20 +85,21 @@ def seat_shapes(
         rear, front = ti.max(s + point[0, 0], 0.0), ti.min(s + point[points - 1, 0], length)
         count = 0
         if rear <= front:
-            k, last = span_at(rear, cell, span, span_of_cell), span_at(front, cell, span, span_of_cell)
-            place[j, at.TOUCH_FIRST] = span_first[k]
-            count = span_first[last] + 4 - span_first[k]
+            reached = span_from(reached, rear, span)  # seats ascend
+            k, last = reached, span_from(reached, front, span)
+            place[j, at.TOUCH_FIRST] = first_function(k, span)
+            count = first_function(last, span) + 4 - first_function(k, span)
             for m in range(count * at.N_SEAT_SHAPE):
                 shape[j * at.TOUCHED * at.N_SEAT_SHAPE + m] = 0.0
             if k == last and s + point[0, 0] >= 0.0 and s + point[points - 1, 0] <= length:
-                add_point(j, k, s - span[k, at.SPAN_REAR], 1.0, spread, place, span_first, span, shape)
+                add_point(j, k, s - span[k, at.SPAN_REAR], 1.0, spread, place, span, shape)
             else:
                 for g in range(points):
                     x = s + point[g, 0]
                     if x >= 0.0 and x <= length:
                         while k < last and x > span[k, at.SPAN_FRONT]:
                             k += 1
-                        add_point(j, k, x - span[k, at.SPAN_REAR], point[g, 1], 0.0, place, span_first, span, shape)
+                        add_point(j, k, x - span[k, at.SPAN_REAR], point[g, 1], 0.0, place, span, shape)
             for q in range(count):
                 m = (j * at.TOUCHED + q) * at.N_SEAT_SHAPE
                 N, D = shape[m], -V * shape[m + 1]
@@ -110,8 +115,8 @@ def seat_shapes(
 
 @ti.func
 def seat_forces(
-    c: int, first: int, row_u: int, row_v: int, s0: float, size: Array, constants: Array, place: Array, shape: Array,
-    rail: Array, seat: Array, lanes: Template,
+    c: int, first: int, row_u: int, row_v: int, s0: float, last_pass: int, size: Array, constants: Array, place: Array,
+    shape: Array, rail: Array, seat: Array, lanes: Template,
 ):  # fmt: skip
     """Force of every fastening at the rails' rows ``row_u`` and ``row_v``; loads on the rails.
 
@@ -121,6 +126,7 @@ def seat_forces(
         row_u: Row of the displacements.
         row_v: Row of the velocities.
         s0: Rear seat in the window [m].
+        last_pass: 1 in the last pass, whose forces are kept as extremes.
         size: Sizes, see ``spline_layout``.
         constants: Numbers, see ``layout``.
         place: From :func:`seat_shapes`.
@@ -159,6 +165,10 @@ def seat_forces(
         F_L = factor * (lateral - seat[p + PULL_ITERATE + 1]) + ground * lateral
         M = factor * (moment - seat[p + PULL_ITERATE + 2]) + ground * moment - arm * F_L
         seat[p + ON_RAIL], seat[p + ON_RAIL + 1], seat[p + ON_RAIL + 2] = F_V, F_L, M
+        if last_pass == 1:
+            for m in ti.static(range(3)):
+                seat[p + SMALLEST + m] = ti.min(seat[p + SMALLEST + m], seat[p + ON_RAIL + m])
+                seat[p + LARGEST + m] = ti.max(seat[p + LARGEST + m], seat[p + ON_RAIL + m])
         for q in range(count):
             k = start + q * at.RAIL_ROWS
             N = shape[(j * at.TOUCHED + q) * at.N_SEAT_SHAPE]

@@ -30,28 +30,37 @@ from tiengine.kernels.types import Array, Ints1, Ints2, Ints3, Reals1, Reals2, R
 
 @ti.func
 def sweep_slabs(
-    b: int, dofs: int, stage: Template, dims: Array, size: Array, constants: Array, designs: Array, slab: Array,
-    slab_coefficient: Array, slab_numbers: Array, K: Template,
+    b: int, dofs: int, stage: Template, size: Array, constants: Array, designs: Array, slab: Array, coefficient: Array,
+    K: Template,
 ):  # fmt: skip
-    """A stage of a train's slabs for every design in every group: 0 linear forces, 1 solve."""
-    count = slab_coefficient.shape[0] // (3 * dofs * (2 * K + 1))
+    """A stage of a train's slabs, a group at a time: 0 linear forces, 1 solve. A mixed group once for every design."""
+    matrices = dofs * (2 * K + 1)
     for g in range(size[at.GROUPS]):
         p = b * size[at.GROUPS] + g
         base = p * (dofs + 2 * K) + K
-        for d in range(count):
-            here = 0
-            for lane in range(8):
-                if designs[p][lane] == d:
-                    here = 1
-            if here == 1:
-                start = d * 3 * dofs * (2 * K + 1)
-                if ti.static(stage == 0):
-                    slabs.linear_forces(slab, base, dofs, start, slab_coefficient, designs[p], d, K)
-                else:
-                    slabs.solve(
-                        slab, base, dofs, start + 2 * dofs * (2 * K + 1), slab_coefficient, designs[p], d,
-                        slab_numbers, constants[layout.BETA_DT2], constants[layout.GAMMA_DT], K,
-                    )  # fmt: skip
+        mixed = 0
+        for lane in range(1, 8):
+            if designs[p][lane] != designs[p][0]:
+                mixed = 1
+        if mixed == 0:
+            d = designs[p][0]
+            start = ti.cast(d, ti.i32) * 3 * matrices
+            if ti.static(stage == 0):
+                slabs.linear_forces(slab, base, dofs, start, coefficient, 0, designs[p], d, K)
+            else:
+                slabs.solve(slab, base, dofs, start + 2 * matrices, coefficient, 0, designs[p], d, constants, K)
+        else:
+            for design in range(coefficient.shape[0] // (3 * matrices)):
+                here = 0
+                for lane in range(8):
+                    if designs[p][lane] == design:
+                        here = 1
+                if here == 1:
+                    d, start = ti.cast(design, ti.f64), design * 3 * matrices
+                    if ti.static(stage == 0):
+                        slabs.linear_forces(slab, base, dofs, start, coefficient, 1, designs[p], d, K)
+                    else:
+                        slabs.solve(slab, base, dofs, start + 2 * matrices, coefficient, 1, designs[p], d, constants, K)
         if ti.static(stage == 1):
             slabs.clear_loads(slab, base, dofs)
 
@@ -65,7 +74,7 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
     @ti.kernel
     def spline_steps(
         job: Ints1,
-        record: Ints1,
+        record: Ints2,
         size: Ints1,
         dims: Ints1,
         constants: Reals1,
@@ -77,8 +86,6 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
         seat: lane_vectors,
         seat_point: Reals2,
         span: Reals2,
-        span_first: Ints1,
-        span_of_cell: Ints1,
         seat_place: Ints2,
         seat_shape: Reals1,
         # slabs
@@ -86,7 +93,6 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
         slab_seat: eights,
         slab_design: eights,
         slab_coefficient: Reals1,
-        slab_numbers: Reals1,
         slab_seat_index: Ints3,
         slab_seat_shape: Reals4,
         slab_seat_x: Reals1,
@@ -95,6 +101,7 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
         car_columns: eights,
         car_load: eights,
         car_columns_start: Ints1,
+        vehicle_place: Ints1,
         wheelset_place: Ints2,
         element_place: Ints2,
         element_row: Reals2,
@@ -117,6 +124,18 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
         rail_force: Reals4,
         iterations: Ints2,
         wheel_record: Reals5,
+        body_record: Reals4,
+        # bed, where it is not wholly implicit
+        bed_index: Ints2,
+        bed_shape: Reals2,
+        bed_weight: Reals1,
+        bed_factor: Reals3,
+        bed_rest: Reals3,
+        bed_lateral_K: Reals3,
+        bed_lateral_C: Reals3,
+        bed_numbers: Reals1,
+        bed_motion: Reals2,
+        pressure: Reals3,
     ):
         """Steps of all chunks, chunk by chunk. Arrays as in ``tiengine.engine.spline_arrays``."""
         ti.loop_config(serialize=True)
@@ -132,23 +151,27 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
             train_slab = groups * (dofs + 2 * K)  # places a train
             train_car = size[at.CARS] * at.CAR_ROWS * blocks  # vectors a train
             b0 = c * trains_a_chunk
+            b_end = ti.min(b0 + trains_a_chunk, dims[layout.TRAINS])
+            last_step = job[at.FIRST_STEP] + job[at.STEPS] - 1
 
             if stages & at.SEATS_STAGE and (c == 0 or job[at.STEPS] > 1):
                 seats.seat_shapes(
                     s0, ti.cast(clock[step, layout.FIRST_SEAT], ti.i32),
                     ti.cast(clock[step, layout.FIRST_SLAB], ti.i32), dims[layout.SLOTS], V, size, dims, constants,
-                    seat_point, span, span_first, span_of_cell, seat_place, seat_shape,
+                    seat_point, span, seat_place, seat_shape,
                 )  # fmt: skip
-            if stages & at.PREDICT_STAGE:
+            if stages & at.PREDICT_STAGE and step == job[at.FIRST_STEP]:  # later ones come with the correctors
                 spline_rail.predict(rail, first, n, dt, beta_dt2, gamma_dt)
                 for g in range(b0 * groups, (b0 + trains_a_chunk) * groups):
-                    slabs.predict(slab, g * (dofs + 2 * K) + K, dofs, slab_numbers, constants)
+                    slabs.predict(slab, g * (dofs + 2 * K) + K, dofs, constants)
                 for i in range(b0 * size[at.CARS], (b0 + trains_a_chunk) * size[at.CARS]):
                     cars.predict(car, i * at.CAR_ROWS * blocks, constants, blocks)
+            if stages & at.CONTACT_STAGE:
                 wheels.rail_predicted(c, first, dims, wheel_place, wheel_shape, rail, under, lanes)
 
             for p in range(size[at.PASSES]):
-                row_u, row_v = at.U, at.V
+                row_u, row_v, last_pass = at.U, at.V, ti.cast(p == size[at.PASSES] - 1, ti.i32)
+                ahead = ti.cast(last_pass == 1 and step < last_step, ti.i32)
                 if p == 0:
                     row_u, row_v = at.U_PREDICTED, at.V_PREDICTED
                 initial = ti.cast(p == 0, ti.i32)
@@ -164,15 +187,16 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
                     )
                 if stages & at.SEAT_FORCE_STAGE:
                     seats.seat_forces(
-                        c, first, row_u, row_v, s0, size, constants, seat_place, seat_shape, rail, seat, lanes
-                    )
+                        c, first, row_u, row_v, s0, last_pass, size, constants, seat_place, seat_shape, rail, seat,
+                        lanes,
+                    )  # fmt: skip
                 if stages & at.FORWARD_STAGE:
                     if p == 0:
                         spline_rail.forward(rail, first, n, coefficient, 1, lanes)
                     else:
                         spline_rail.forward(rail, first, n, coefficient, 0, lanes)
                 if stages & at.CAR_STAGE:
-                    for b in range(b0, ti.min(b0 + trains_a_chunk, dims[layout.TRAINS])):
+                    for b in range(b0, b_end):
                         cars.loads(
                             b, row_u, row_v, V_rate, size, dims, car_load, wheelset_place, wheel, wheelset_force,
                             element_place, element_row, element_kind, element_linear, element_table, car, blocks,
@@ -189,10 +213,10 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
                         c, first, beta_dt2, gamma_dt, dims, wheel_place, wheel_rows, rail, under, lanes
                     )
                     tolerance, row = ct.ITERATE_TOLERANCE * constants[layout.STATIC_LOAD], -1
-                    if p == size[at.PASSES] - 1:
+                    if last_pass == 1:
                         tolerance = constants[layout.CONTACT_TOLERANCE] * constants[layout.STATIC_LOAD]
-                        row = record[step]
-                    for b in range(b0, ti.min(b0 + trains_a_chunk, dims[layout.TRAINS])):
+                        row = record[step, 0]
+                    for b in range(b0, b_end):
                         wheels.contact_of_train(
                             b, c, 2 * (b - b0), step, V, tolerance, row, dims, constants, wheel_place,
                             wheelset_place, car_columns_start, car_columns, wheel, table, irregularity,
@@ -201,10 +225,17 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
                         )  # fmt: skip
                     wheels.add_wheel_columns(c, first, dims, wheel_place, wheel_rows, rail, under)
                 if stages & at.BACKWARD_STAGE:
-                    spline_rail.backward(rail, first, n, coefficient, beta_dt2, gamma_dt, lanes)
+                    spline_rail.backward(rail, first, n, coefficient, dt, beta_dt2, gamma_dt, ahead, lanes)
                 if stages & at.CAR_STAGE:
                     for i in range(b0 * size[at.CARS], (b0 + trains_a_chunk) * size[at.CARS]):
                         cars.correct(car, i * at.CAR_ROWS * blocks, beta_dt2, gamma_dt, blocks)
+                        if ahead == 1:
+                            cars.predict(car, i * at.CAR_ROWS * blocks, constants, blocks)
+                    if last_pass == 1 and record[step, 1] >= 0:
+                        for b in range(b0, b_end):
+                            cars.record_bodies(
+                                b, record[step, 1], b * train_car * 8, vehicle_place, car, body_record, blocks
+                            )
                 if stages & at.EXCHANGE_STAGE:
                     seats.loads_on_slabs(c, trains_a_chunk, size, dims, seat_place, seat, slab_seat)
                 if stages & at.SLAB_STAGE:
@@ -213,13 +244,22 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
                             slab, g * (dofs + 2 * K) + K, dofs, g * at.SLAB_SEAT_ROWS * per_slab, per_slab,
                             slab_seat_index, slab_seat_shape, slab_seat_x, slab_seat,
                         )  # fmt: skip
+                    if dims[layout.MORTAR_MODE] > 0:
+                        for b in range(b0, b_end):
+                            for slot in range(dims[layout.SLOTS]):
+                                group = b * groups + slot // 8
+                                slabs.bed_forces(
+                                    b, slot, group * (dofs + 2 * K) + K, row_u, row_v, dofs,
+                                    ti.cast(slab_design[group][slot % 8], ti.i32), bed_index, bed_shape, bed_weight,
+                                    bed_factor, bed_rest, bed_lateral_K, bed_lateral_C, bed_numbers, slab, bed_motion,
+                                    pressure,
+                                )  # fmt: skip
                     for b in range(b0, b0 + trains_a_chunk):
                         if p == 0:
-                            sweep_slabs(
-                                b, dofs, 0, dims, size, constants, slab_design, slab, slab_coefficient, slab_numbers, K
-                            )
-                        sweep_slabs(
-                            b, dofs, 1, dims, size, constants, slab_design, slab, slab_coefficient, slab_numbers, K
-                        )
+                            sweep_slabs(b, dofs, 0, size, constants, slab_design, slab, slab_coefficient, K)
+                        sweep_slabs(b, dofs, 1, size, constants, slab_design, slab, slab_coefficient, K)
+                    if ahead == 1:
+                        for g in range(b0 * groups, (b0 + trains_a_chunk) * groups):
+                            slabs.predict(slab, g * (dofs + 2 * K) + K, dofs, constants)
 
     return spline_steps

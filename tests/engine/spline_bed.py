@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 
 from tiengine.engine.banded import BandedBlock
 from tiengine.engine.spline_arrays import CarTables, RailTables, SeatTables, SlabTables, Spans, SplineState, spans_of
+from tiengine.engine.spline_step import Bed as SlabBed
 from tiengine.engine.spline_step import Contact, SplineStep, Suspension
 from tiengine.engine.vector_mode import lanes_for
 from tiengine.integrator import seat_inverse_terms, seat_shapes
@@ -145,6 +146,8 @@ class Bed:
     clock: Floats
     irregularity: Floats
     record: Floats
+    body_record: Floats
+    slab_bed: SlabBed
     step: SplineStep
     designs: list[tuple[Floats, Floats, Floats]]
 
@@ -224,7 +227,7 @@ def make_bed(
     designs = _slab_designs(model)
     A, K, C = designs[0]
     designs.append((A - 0.5 * (beta_dt2 * K + gamma_dt * C), 0.5 * K, 0.5 * C))
-    slabs = SlabTables.of(designs, c, first.seat_index, first.seat_w, first.seat_slope, first.seat_x)
+    slabs = SlabTables.of(designs, first.seat_index, first.seat_w, first.seat_slope, first.seat_x)
     cars = CarTables.of(
         train.M, train.C + V * train.C_speed, train.K, np.stack([train.gravity, train.acceleration_force]),
         cars_of(train), train.wheelset_dof, train.element_index, beta_dt2, gamma_dt,
@@ -253,14 +256,20 @@ def make_bed(
     for b in range(B):
         irregularity[b] = 1e-4 * np.random.default_rng((7, b)).standard_normal((steps, W, at.N_IRREGULARITY))
     record = np.zeros((B, steps, W, 2, at.N_WHEEL))
+    body_record = np.zeros((B, steps, 3, train.n_dof))
+    slab_bed = SlabBed(
+        model.bed_index, model.bed_shape, model.bed_weight, *(np.concatenate([f, f[:1]]) for f in (
+            model.bed_factor, model.bed_rest, model.bed_lateral_K, model.bed_lateral_C)), model.bed_numbers,
+        np.zeros((B, given.slots, 2)),
+    )  # fmt: skip
     step = SplineStep(
         state, model.dims, c, passes, rails, spans, seats, slabs,
         Suspension(train.element_row, train.element_kind, train.element_linear, train.element_table), contact, clock,
-        irregularity, record,
+        irregularity, record, body_record, slab_bed,
     )  # fmt: skip
     return Bed(
-        model, rail, spans, model.wheel_s, V, state, seats, slabs, rails, contact, clock, irregularity, record, step,
-        designs,
+        model, rail, spans, model.wheel_s, V, state, seats, slabs, rails, contact, clock, irregularity, record, body_record,
+        slab_bed, step, designs,
     )  # fmt: skip
 
 

@@ -87,11 +87,11 @@ def test_any_lanes_and_any_place_give_the_same_bits() -> None:
     """Seeds go by train, so that train b is the same alone and in a batch."""
 
     def bits(given: Bed, b: int) -> list[NDArray[np.float64]]:
-        given.step.record[:] = np.arange(len(given.step.record))
+        given.step.record[:] = np.arange(len(given.step.record))[:, None]
         given.step(0)
         given.step(1, 3)
         state = motion_of(given, b)
-        return [state.rails, state.slabs, state.train, given.contact.force[b], given.record[b]]
+        return [state.rails, state.slabs, state.train, given.contact.force[b], given.record[b], given.body_record[b]]
 
     batch = bed(6)
     together = [bits(batch, 0)] + [[a.copy() for a in bits_of(batch, b)] for b in (3, 5)]
@@ -108,7 +108,7 @@ def test_any_lanes_and_any_place_give_the_same_bits() -> None:
 
 def bits_of(given: Bed, b: int) -> list[NDArray[np.float64]]:
     state = motion_of(given, b)
-    return [state.rails, state.slabs, state.train, given.contact.force[b], given.record[b]]
+    return [state.rails, state.slabs, state.train, given.contact.force[b], given.record[b], given.body_record[b]]
 
 
 def test_steps_in_one_launch_are_single_steps() -> None:

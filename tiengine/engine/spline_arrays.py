@@ -12,7 +12,6 @@ from scipy.interpolate import BSpline
 
 from tiengine.engine.aligned import aligned_copy, aligned_zeros
 from tiengine.engine.banded import BandedBlock, Factors, rail_coefficients, wheel_rows
-from tiengine.kernels import layout
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels import spline_seats as seat_rows
 from tiengine.kernels import spline_wheels as wheel_vectors
@@ -29,24 +28,20 @@ class Spans:
     """The knots' spans, for values anywhere in the window.
 
     Attributes:
-        span: Ends and polynomials, shape (spans, N_SPAN).
-        first: First of the four functions of each span, shape (spans,).
-        of_cell: Span at the rear end of each of the uniform cells over the window, shape (cells,).
+        span: Ends, polynomials, first of the four functions, shape (spans, N_SPAN).
     """
 
     span: Floats
-    first: Ints
-    of_cell: Ints
 
     def at(self, s: Floats) -> tuple[NDArray[np.intp], Floats]:
         """First functions, and values and slopes of four, at given places; shapes (m,) and (m, 4, 2)."""
         k = np.clip(np.searchsorted(self.span[:, at.SPAN_FRONT], s), 0, len(self.span) - 1)
         t = s - self.span[k, at.SPAN_REAR]
-        c = self.span[k, at.SPAN_POLYNOMIALS :].reshape(-1, 4, 4)
+        c = self.span[k, at.SPAN_POLYNOMIALS : at.SPAN_FIRST].reshape(-1, 4, 4)
         powers = np.stack([np.ones_like(t), t, t**2, t**3], axis=1)
         slopes = np.stack([np.zeros_like(t), np.ones_like(t), 2.0 * t, 3.0 * t**2], axis=1)
         values = np.stack([np.einsum("mfp,mp->mf", c, p) for p in (powers, slopes)], axis=2)
-        return self.first[k].astype(np.intp), values
+        return self.span[k, at.SPAN_FIRST].astype(np.intp), values
 
 
 def spans_of(knots: Floats, combine: Floats | None = None) -> Spans:
@@ -61,21 +56,18 @@ def spans_of(knots: Floats, combine: Floats | None = None) -> Spans:
     count = len(knots) - 4
     weights = np.eye(count) if combine is None else combine
     breaks = np.unique(knots[3 : count + 1])
-    span, first = np.zeros((len(breaks) - 1, at.N_SPAN)), np.zeros(len(breaks) - 1, dtype=np.int32)
+    span = np.zeros((len(breaks) - 1, at.N_SPAN))
     span[:, at.SPAN_REAR], span[:, at.SPAN_FRONT] = breaks[:-1], breaks[1:]
     spline = BSpline(knots, weights.T, 3)
     rear_values = [spline(breaks[:-1], nu) / factor for nu, factor in enumerate((1.0, 1.0, 2.0, 6.0))]
     for k, c in enumerate(np.stack(rear_values, axis=1)):  # c0..c3 by function
         touched = np.flatnonzero(np.abs(c).max(axis=0) > 0.0)
-        first[k] = min(int(touched.min()), c.shape[1] - 4)
-        if touched.max() - first[k] > 3:
+        first = min(int(touched.min()), c.shape[1] - 4)
+        if touched.max() - first > 3:
             raise ValueError(f"span {k} touches functions {touched.min()} to {touched.max()}, may touch four")
-        span[k, at.SPAN_POLYNOMIALS :] = c[:, first[k] : first[k] + 4].T.ravel()
-    length = breaks[-1] - breaks[0]
-    cells = int(np.ceil(length / np.diff(breaks).min()))
-    rear_ends = breaks[0] + length / cells * np.arange(cells)
-    of_cell = np.searchsorted(breaks, rear_ends, side="right") - 1
-    return Spans(span, first, np.clip(of_cell, 0, len(span) - 1).astype(np.int32))
+        span[k, at.SPAN_POLYNOMIALS : at.SPAN_FIRST] = c[:, first : first + 4].T.ravel()
+        span[k, at.SPAN_FIRST] = first
+    return Spans(span)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,15 +178,15 @@ class SlabTables:
         half_width: K of the bands.
         coefficient: Rows of K and C, shape (N, 2, 2K + 1), then L, 1/diagonal, U/diagonal, shape (N, 2K + 1), design by
             design, in a row.
-        numbers: k and c of what the fastenings feel of each coordinate, shape (2N,).
+        dofs: N.
         seat_index: Coordinates under each seat, shape (2, seats a slab, touched).
         seat_shape: Their shapes for w, then dw/dy, shape (2, 2, seats a slab, touched).
         seat_x: Seats from the slab's centre [m], shape (seats a slab,).
     """
 
+    dofs: int
     half_width: int
     coefficient: Floats
-    numbers: Floats
     seat_index: NDArray[np.int32]
     seat_shape: Floats
     seat_x: Floats
@@ -203,7 +195,6 @@ class SlabTables:
     def of(
         cls,
         designs: Sequence[tuple[Floats, Floats, Floats]],
-        constants: Floats,
         seat_index: NDArray[np.int32],
         seat_w: Floats,
         seat_slope: Floats,
@@ -214,13 +205,11 @@ class SlabTables:
         Args:
             designs: For each design A with its own fastenings, and K and C of what A takes off at the predictors,
                 shape (N, N) each; the sound design first.
-            constants: Numbers, see ``layout``.
             seat_index: Coordinates under the seats, shape (seats, 2, touched).
             seat_w: Shapes of w there, shape (seats, 2, touched).
             seat_slope: Shapes of dw/dy.
             seat_x: Seats from the slab's centre [m], shape (seats,).
         """
-        N = len(designs[0][0])
         width = max(_half_width(A) for A, _, _ in designs)
         rows = []
         for A, K, C in designs:
@@ -228,13 +217,10 @@ class SlabTables:
             rows.append(np.stack([_band_rows(K, width), _band_rows(C, width)], axis=1).ravel())
             inverse = factors.inverse_diagonal[:, None]
             rows.append(np.hstack([factors.lower, inverse, factors.upper]).ravel())
-        numbers = np.zeros((N, 2))
-        numbers[:-2] = constants[layout.K_VERTICAL], constants[layout.C_VERTICAL]
-        numbers[-2:] = constants[layout.K_LATERAL], constants[layout.C_LATERAL]
         return cls(
+            dofs=len(designs[0][0]),
             half_width=width,
             coefficient=aligned_copy(np.concatenate(rows)),
-            numbers=numbers.ravel(),
             seat_index=np.ascontiguousarray(seat_index.transpose(1, 0, 2), dtype=np.int32),
             seat_shape=np.ascontiguousarray(np.stack([seat_w, seat_slope]).transpose(0, 2, 1, 3)),
             seat_x=np.ascontiguousarray(seat_x),
@@ -263,6 +249,7 @@ class CarTables:
         columns: -A^-1 K, -A^-1 C, A^-1 of each different car by columns, vectors, shape (vectors, 8).
         columns_start: First vector of each car's tables, shape (cars,).
         load: Gravity, then force per unit rate of speed, vectors, shape (2 cars blocks, 8).
+        vehicle_place: Places of the train's coordinates in row 0 of a train, shape (n,).
         wheelset_place: Places of y, z, roll, pitch, yaw, shape (W, 5).
         element_place: Places of the elements' coordinates, shape (n_e, 12).
         wheelset_compliance: A^-1 at the wheelsets, shape (W, 5, 5).
@@ -274,6 +261,7 @@ class CarTables:
     columns: Floats
     columns_start: Ints
     load: Floats
+    vehicle_place: Ints
     wheelset_place: Ints
     element_place: Ints
     wheelset_compliance: Floats
@@ -348,6 +336,7 @@ class CarTables:
             columns=aligned_copy(np.stack(columns).reshape(-1, 8)),
             columns_start=np.array(starts, dtype=np.int32),
             load=aligned_copy(loads.reshape(-1, 8)),
+            vehicle_place=place,
             wheelset_place=place[wheelset_dof],
             element_place=place[element_index],
             wheelset_compliance=compliance,
@@ -393,7 +382,7 @@ class SplineState:
         """All zero, all fastenings sound, all slabs of the first design."""
         chunks, groups = -(-2 * trains // lanes), -(-slots // 8)
         whole = chunks * lanes // 2
-        N, K, per_slab = len(slabs.numbers) // 2, slabs.half_width, len(slabs.seat_x)
+        N, K, per_slab = slabs.dofs, slabs.half_width, len(slabs.seat_x)
         state = cls(
             trains=trains,
             lanes=lanes,

@@ -13,7 +13,7 @@ from tiengine.kernels import layout
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels.spline_step import step_kernel
 
-__all__ = ["Contact", "Suspension", "SplineStep"]
+__all__ = ["Bed", "Contact", "SplineStep", "Suspension"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -59,13 +59,36 @@ class Contact:
     iterations: Ints
 
 
+@dataclass(frozen=True, eq=False)
+class Bed:
+    """Bed of the slabs where it is not wholly implicit, shapes as ``tiengine.model`` has them.
+
+    Attributes:
+        index, shape, weight: Quadrature.
+        factor, rest: Factors and pressures at rest by design.
+        lateral_K, lateral_C: Lateral bed by design, shape (designs, 2, 2).
+        numbers: k_m, c_m, explicit, no tension.
+        pressure: Largest and smallest pressure of each slab [Pa], shape (B, slots, 2); filled.
+    """
+
+    index: Ints
+    shape: Floats
+    weight: Floats
+    factor: Floats
+    rest: Floats
+    lateral_K: Floats
+    lateral_C: Floats
+    numbers: Floats
+    pressure: Floats
+
+
 class SplineStep:
     """Whole steps in one launch.
 
     Attributes:
         state: What is advanced, in place.
         job: First step, number of steps, stages (``spline_layout``) of the next launch.
-        record: Row of the wheels' record that each step of the chunk fills, -1 for none, shape (steps,).
+        record: Rows of the wheels' and of the bodies' record that each step fills, -1 for none, shape (steps, 2).
         launch: The bound kernel; ``launch.vector_mode`` tells how it was compiled.
     """
 
@@ -84,12 +107,14 @@ class SplineStep:
         clock: Floats,
         irregularity: Floats,
         wheel_record: Floats,
+        body_record: Floats,
+        bed: Bed,
     ):
         """Bind.
 
         Args:
             state: What is advanced.
-            dims: TRAINS, WHEELSETS, SEATS_PER_SLAB, SLOTS, CROSS_LEVEL_ROLLS are read, see ``layout``.
+            dims: TRAINS, WHEELSETS, SEATS_PER_SLAB, SLOTS, MORTAR_MODE, CROSS_LEVEL_ROLLS are read, see ``layout``.
             constants: Numbers, see ``layout``.
             passes: Passes a step.
             rails: Tables of the rails.
@@ -101,6 +126,8 @@ class SplineStep:
             clock: Window at the end of each step, shape (steps, N_CLOCK).
             irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
             wheel_record: Wheel output, shape (B, rows, W, 2, N_WHEEL).
+            body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
+            bed: Bed, read if MORTAR_MODE is not 0.
         """
         cars = state.cars
         size = np.zeros(at.N_SIZE, dtype=np.int32)
@@ -110,18 +137,21 @@ class SplineStep:
         size[at.CARS], size[at.CAR_DOFS], size[at.ELEMENTS] = len(cars.car), cars.dofs, len(suspension.kind)
         self.state, self.size = state, size
         self.job = np.array([0, 1, at.ALL_STAGES], dtype=np.int32)
-        self.record = np.full(len(clock), -1, dtype=np.int32)
+        self.record = np.full((len(clock), 2), -1, dtype=np.int32)
         arrays = (
             self.job, self.record, size, dims, constants, clock,
             state.rail, rails.coefficient,
-            state.seat, seats.point, spans.span, spans.first, spans.of_cell, seats.place, seats.shape,
-            state.slab, state.slab_seat, state.slab_design, slabs.coefficient, slabs.numbers, slabs.seat_index,
+            state.seat, seats.point, spans.span, seats.place, seats.shape,
+            state.slab, state.slab_seat, state.slab_design, slabs.coefficient, slabs.seat_index,
             slabs.seat_shape, slabs.seat_x,
-            state.car, cars.columns, cars.load, cars.columns_start, cars.wheelset_place, cars.element_place,
+            state.car, cars.columns, cars.load, cars.columns_start, cars.vehicle_place, cars.wheelset_place,
+            cars.element_place,
             suspension.row, suspension.kind, suspension.linear, suspension.table,
             state.under, rails.wheel_place, rails.wheel_shape, rails.wheel_rows, contact.wheel, contact.table,
             irregularity, cars.wheelset_compliance, rails.coupling, contact.contact, contact.force,
             contact.wheelset_force, contact.rail_force, contact.iterations, wheel_record,
+            body_record, bed.index, bed.shape, bed.weight, bed.factor, bed.rest, bed.lateral_K, bed.lateral_C, bed.numbers,
+            np.zeros((3, slabs.dofs)), bed.pressure,
         )  # fmt: skip
         vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, state.car,
                    cars.columns, cars.load)  # fmt: skip
