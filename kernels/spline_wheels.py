@@ -153,7 +153,7 @@ def contact_of_train(
     start = b * cars * at.CAR_ROWS * blocks * 8
     for w in range(dims[layout.WHEELSETS]):
         p = (c * dims[layout.WHEELSETS] + w) * N_UNDER
-        felt = ct.felt_at(b, step, w, irregularity)
+        channels = ct.channels_at(b, step, w, irregularity)
         x, dx = wheelset_without_change(b, w, start, constants, wheelset_place, car, blocks)
         left = rail_without_change(b, w, 0, p, lane, dims, constants, place, coupling, rail_force, under)
         right = rail_without_change(b, w, 1, p, lane + 1, dims, constants, place, coupling, rail_force, under)
@@ -161,7 +161,7 @@ def contact_of_train(
         for m in ti.static(range(5)):
             before[m] = wheelset_force[b, w, m]
         count = ct.solve_wheelset(
-            b, w, V, x, dx, left, right, felt, dims, constants, wheel, table, wheelset_compliance, coupling, contact,
+            b, w, V, x, dx, left, right, channels, dims, constants, wheel, table, wheelset_compliance, coupling, contact,
             force, wheelset_force, rail_force, tolerance,
         )  # fmt: skip
         add_wheelset_change(

@@ -15,12 +15,12 @@ from tiengine.engine.spline_arrays import CarTables, RailTables, SeatTables, Sla
 from tiengine.engine.spline_step import Bed as SlabBed
 from tiengine.engine.spline_step import Contact, SplineStep, Suspension
 from tiengine.engine.vector_mode import lanes_for
-from tiengine.integrator import seat_inverse_terms, seat_shapes
+from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes
 from tiengine.kernels import layout as at
 from tiengine.kernels import spline_layout as sl
 from tiengine.kernels.wheel_rail import COS, N_CONTACT
-from tiengine.model import Model
-from tiengine.train import TrainModel
+from tiengine.model.model import Model
+from tiengine.vehicle.train import TrainModel
 
 Floats = NDArray[np.float64]
 SINK = 2e-4
@@ -50,7 +50,7 @@ class SplineRail:
 
 def spline_rail(model: Model, knots: Floats, V: float) -> SplineRail:
     """Galerkin matrices in their weak form; A_s smears the fastenings."""
-    rail, c = model.given.rail, model.constants
+    rail, c = model.ingredients.rail, model.constants
     n = len(knots) - 4
     breaks = knots[3 : n + 1]
     x, weight = np.polynomial.legendre.leggauss(5)
@@ -155,27 +155,27 @@ class Bed:
         """Every coordinate of every train a small number of its own; the same for train b in any batch."""
         s = self.state
         rails = {row: np.zeros((s.trains, 2, s.functions, 5)) for row in (sl.U, sl.V, sl.A)}
-        cars = {row: np.zeros((s.trains, self.model.given.train.n)) for row in (sl.U, sl.V, sl.A)}
+        cars = {row: np.zeros((s.trains, self.model.ingredients.train.n)) for row in (sl.U, sl.V, sl.A)}
         for b in range(s.trains):
             rng = np.random.default_rng((seed, b))
             for row, size in ((sl.U, 1e-4), (sl.V, 1e-2), (sl.A, 1.0)):
                 rails[row][b] = kick * size * rng.standard_normal((2, s.functions, 5))
                 for field in (0, 2, 4):
                     rails[row][b][:, [0, -1], field] = 0.0
-                cars[row][b] = kick * 0.1 * size * rng.standard_normal(self.model.given.train.n)
+                cars[row][b] = kick * 0.1 * size * rng.standard_normal(self.model.ingredients.train.n)
                 view = s.slabs(row)[b]
                 view[...] = kick * 0.1 * size * rng.standard_normal(view.shape)
         for row in (sl.U, sl.V, sl.A):
             s.set_rails(row, rails[row])
             s.set_vehicles(row, cars[row])
             z = cars[sl.U]
-        z[:, self.model.given.train.wheelset_dof[:, 1]] += SINK
+        z[:, self.model.ingredients.train.wheelset_dof[:, 1]] += SINK
         s.set_vehicles(sl.U, z)
 
 
 def _slab_designs(model: Model) -> list[tuple[Floats, Floats, Floats]]:
     """A, K, C of every design, as ``tiengine.model`` makes them."""
-    given = model.given
+    given = model.ingredients
     seats = seat_shapes(given.designs.matrices[0])
     out = []
     for slab, scale in zip(given.designs.matrices, given.designs.seat_scale, strict=True):
@@ -193,7 +193,7 @@ def make_bed(
     absorbing: float = 0.0, residual: float = 0.0, soft: tuple[int, ...] = (), factors: bool = False,
     tolerance: float | None = None,
 ) -> Bed:  # fmt: skip
-    """Everything for ``model.given.trains`` trains.
+    """Everything for ``model.ingredients.trains`` trains.
 
     Args:
         model: Parts other than the rails.
@@ -211,18 +211,18 @@ def make_bed(
         factors: Fastenings with factors of their own, one failed.
         tolerance: Of the contact in the last pass, relative to the static load; the model's if None.
     """
-    given, train = model.given, model.given.train
+    given, train = model.ingredients, model.ingredients.train
     c = model.constants.copy()
     c[at.ABSORBING_ZONE] = absorbing
     c[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1] = residual
     c[at.CONTACT_TOLERANCE] = c[at.CONTACT_TOLERANCE] if tolerance is None else tolerance
     model = replace(model, constants=c)
     B, W = given.trains, len(train.wheelset_x)
-    knots = graded_knots(given.length, model.wheel_s, fine, coarse)
+    knots = graded_knots(given.length, given.wheel_s, fine, coarse)
     rail = spline_rail(model, knots, V)
     spans = spans_of(knots)
     beta_dt2, gamma_dt = given.newmark.beta_dt2, given.newmark.gamma_dt
-    rails = RailTables.of(rail.vertical, rail.lateral, spans, model.wheel_s, beta_dt2, gamma_dt)
+    rails = RailTables.of(rail.vertical, rail.lateral, spans, given.wheel_s, beta_dt2, gamma_dt)
     first = given.designs.matrices[0]
     designs = _slab_designs(model)
     A, K, C = designs[0]
@@ -268,7 +268,7 @@ def make_bed(
         irregularity, record, body_record, slab_bed,
     )  # fmt: skip
     return Bed(
-        model, rail, spans, model.wheel_s, V, state, seats, slabs, rails, contact, clock, irregularity, record, body_record,
+        model, rail, spans, given.wheel_s, V, state, seats, slabs, rails, contact, clock, irregularity, record, body_record,
         slab_bed, step, designs,
     )  # fmt: skip
 
@@ -286,7 +286,7 @@ def motion_of(bed: Bed, b: int) -> Motion:
     """The present state of train b, rows u, v, a first in every array."""
     s = bed.state
     rows = (sl.U, sl.V, sl.A)
-    slots = bed.model.given.slots
+    slots = bed.model.ingredients.slots
     return Motion(
         np.stack([s.rails(row)[b] for row in rows]),
         np.stack([s.slabs(row)[b].reshape(-1, s.slab_dofs)[:slots] for row in rows]),
@@ -308,7 +308,7 @@ def reference_pass(
         wheelset_force: On y, z, roll, pitch, yaw, shape (W, 5).
         k: Step.
     """
-    given, c, train = bed.model.given, bed.model.constants, bed.model.given.train
+    given, c, train = bed.model.ingredients, bed.model.constants, bed.model.ingredients.train
     newmark = given.newmark
     P = newmark.predictor
     tilde = Motion(*(np.tensordot(P, rows, 1) for rows in (start.rails, start.slabs, start.train)))
@@ -411,4 +411,4 @@ def with_trains(model: Model, trains: int) -> Model:
     """The same model for another number of trains (dims only)."""
     dims = model.dims.copy()
     dims[at.TRAINS] = trains
-    return replace(model, given=replace(model.given, trains=trains), dims=dims)
+    return replace(model, ingredients=replace(model.ingredients, trains=trains), dims=dims)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tiengine.kernels import layout as at
 from tiengine.kernels.contact import ITERATE_TOLERANCE
 from tiengine.kernels import spline_layout as sl
-from tiengine.start import evaluate_contact
+from tiengine.engine.equilibrium import evaluate_contact
 
 from ..models import V350, paper_model
 from .spline_bed import Bed, Motion, make_bed, motion_of, reference_pass, with_trains
@@ -68,7 +68,7 @@ def test_forces_are_the_law_at_the_end_of_the_step(residual: float) -> None:
     """At the coordinates the step leaves behind, the law gives the forces it used, once the passes have converged."""
     given = bed(2, residual=residual, passes=8)
     given.step(0)
-    train = given.model.given.train
+    train = given.model.ingredients.train
     first, shape = given.spans.at(given.wheel_s)
     u, v = (given.state.rails(row)[..., [0, 2, 4]] for row in (sl.U, sl.V))
     near = first[:, None] + np.arange(4)

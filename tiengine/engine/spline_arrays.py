@@ -401,9 +401,9 @@ class SplineState:
         state.set_seat_factors(np.ones((trains, seats, 2)))
         return state
 
-    def rails(self, row: int) -> Floats:
-        """A row of the rails, copied: shape (B, 2, n, 5)."""
-        view = self._rail_view(row)
+    def rails(self, row: int, first: int = 0, count: int | None = None) -> Floats:
+        """A row of the rails, copied: shape (B, 2, n, 5), or of ``count`` functions from ``first`` on."""
+        view = self._rail_view(row)[..., first : None if count is None else first + count, :]
         chunks, t, sides, n, five = view.shape
         return view.reshape(chunks * t, sides, n, five)[: self.trains]
 
@@ -445,6 +445,37 @@ class SplineState:
         view = self._car_view(row)
         for i, dof in enumerate(self.cars.car):
             view[:, i, : len(dof)] = values[:, dof]
+
+    def cars_row(self, row: int) -> Floats:
+        """A row of the cars as a view, unused coordinates included: shape (B, cars, places)."""
+        return self._car_view(row)
+
+    @property
+    def designs(self) -> NDArray[np.int64]:
+        """Design of the slab in each slot, those of the last group without a slab included, shape (8 groups,)."""
+        return self.slab_design.reshape(self._whole, -1)[0].astype(np.int64)
+
+    def renew_slab(self, slot: int, design: int) -> None:
+        """Put a slab at rest and of a design into a slot of all trains."""
+        group, lane = divmod(slot, 8)
+        groups = len(self.slab_design) // self._whole
+        self.slab.reshape(self._whole, groups, -1, 8)[:, group, :, lane] = 0.0
+        self.slab_design.reshape(self._whole, groups, 8)[:, group, lane] = design
+
+    def clear(self, train: int) -> None:
+        """Zero rails, slabs and cars of a train."""
+        chunk, t = divmod(train, self.lanes // 2)
+        lanes = slice(2 * t, 2 * t + 2)
+        padded = self.functions + 2 * at.REACH
+        self.rail.reshape(-1, padded * at.RAIL_ROWS, self.lanes)[chunk, :, lanes] = 0.0
+        self.slab.reshape(self._whole, -1)[train] = 0.0
+        self.car.reshape(self._whole, -1)[train] = 0.0
+        seats = self.seat.reshape(len(self.rail) // (padded * at.RAIL_ROWS), -1, seat_rows.N_SEAT, self.lanes)
+        seats[chunk, :, : seat_rows.FACTOR, lanes] = 0.0
+
+    def fill_seats(self, first: int, count: int, value: float) -> None:
+        """Fill vectors of all seats from ``first`` on with a number."""
+        self.seat.reshape(-1, seat_rows.N_SEAT, self.lanes)[:, first : first + count] = value
 
     def _car_view(self, row: int) -> Floats:
         """A row of the cars as (train, car, coordinate)."""

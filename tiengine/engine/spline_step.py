@@ -38,7 +38,7 @@ class Suspension:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """What the contact solve reads and leaves, shapes as ``tiengine.state`` and ``tiengine.model`` have them.
+    """What the contact solve reads and leaves, shapes as ``engine.sine_state`` and ``model.model`` have them.
 
     Attributes:
         wheel: r0, b0, spin inertia, shape (W, 3).
@@ -61,7 +61,7 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Bed:
-    """Bed of the slabs where it is not wholly implicit, shapes as ``tiengine.model`` has them.
+    """Bed of the slabs where it is not wholly implicit, shapes as ``model.model`` has them.
 
     Attributes:
         index, shape, weight: Quadrature.

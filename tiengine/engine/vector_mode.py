@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from taichi.lang import impl
 
 from tiengine.engine.aligned import is_aligned
-from tiengine.launch import TESTED
+from tiengine.engine.launch import TESTED
 
 __all__ = ["VectorLaunch", "lanes_for", "vector_mode_wanted"]
 

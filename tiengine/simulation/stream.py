@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from tiengine.model.model import Ingredients
+from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.checkpoint import Checkpoint
 from tiengine.simulation.messages import Begun, Costs, Ended, Lost, Message, Paused, Saved
