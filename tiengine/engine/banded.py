@@ -18,6 +18,7 @@ from tiengine.kernels.banded_lu import factorise
 __all__ = ["BandedBlock", "Factors", "WheelRows", "rail_coefficients", "wheel_rows"]
 
 NEGLIGIBLE = 1e-14  # of the largest entry: where a wheel's one-sided rows and columns are cut
+ROOM = 12  # functions more than a wheel's rows need now: they change with the speed
 FIELDS = (2, 3)  # of the vertical and the lateral block
 
 
@@ -243,7 +244,7 @@ def _cut(rows: NDArray[np.float64], first: NDArray[np.intp], coupling: NDArray[n
         place[w, at.WHEEL_FIRST] = first[w]
         wheels = np.flatnonzero(near[w])
         place[w, at.COUPLED_FIRST], place[w, at.COUPLED_END] = wheels.min(), wheels.max() + 1
-    longest = int(place[:, at.ROWS_COUNT].max())
+    longest = min(len(rows), int(place[:, at.ROWS_COUNT].max()) + ROOM)
     short = np.zeros((W, longest, at.N_WHEEL_FUNCTION))
     for w in range(W):
         count = place[w, at.ROWS_COUNT]

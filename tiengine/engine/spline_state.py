@@ -17,6 +17,9 @@ __all__ = ["SplineState"]
 
 Floats = NDArray[np.float64]
 
+NOTHING_SEEN = 1e300
+"""N: beyond any force; infinities do not exist for code made with fast mathematics."""
+
 
 @dataclass(frozen=True, eq=False)
 class SplineState:
@@ -74,13 +77,14 @@ class SplineState:
             car=aligned_zeros((whole * len(cars.car) * at.CAR_ROWS * cars.blocks, 8)),
         )
         state.set_seat_factors(np.ones((trains, seats, 2)))
+        state.forget_extremes()
         return state
 
     def rails(self, row: int) -> Floats:
         """A row of the rails, copied: shape (B, 2, n, 5)."""
         view = self._rail_view(row)
         chunks, t, sides, n, five = view.shape
-        return view.reshape(chunks * t, sides, n, five)[: self.trains]
+        return view.reshape(chunks * t, sides, n, five)[: self.trains].copy()
 
     def set_rails(self, row: int, values: Floats) -> None:
         """Fill a row of the rails from shape (B, 2, n, 5)."""
@@ -131,7 +135,7 @@ class SplineState:
         seats = len(self.seat) // (seat_rows.N_SEAT * (len(self.rail) // (self._padded * at.RAIL_ROWS)))
         whole = self.seat.reshape(-1, seats, seat_rows.N_SEAT, self.lanes // 2, 2)
         view = whole[:, :, first : first + count].transpose(0, 3, 4, 2, 1)
-        return view.reshape(-1, 2, count, seats)[: self.trains]
+        return view.reshape(-1, 2, count, seats)[: self.trains].copy()
 
     def set_seat_factors(self, factors: Floats) -> None:
         """Factors of the fastenings in the window, shape (B, seats, 2)."""
@@ -140,6 +144,30 @@ class SplineState:
         for b in range(self.trains):
             c, t = divmod(b, self.lanes // 2)
             whole[c, :, seat_rows.FACTOR, t] = factors[b]
+
+    def forget_extremes(self) -> None:
+        """Let the seats' smallest and largest forces start anew; rows SMALLEST, LARGEST of :meth:`seats`."""
+        vectors = self.seat.reshape(-1, seat_rows.N_SEAT, self.lanes)
+        vectors[:, seat_rows.SMALLEST : seat_rows.SMALLEST + 3] = NOTHING_SEEN
+        vectors[:, seat_rows.LARGEST : seat_rows.LARGEST + 3] = -NOTHING_SEEN
+
+    def enter_slab(self, slot: int, design: int) -> None:
+        """Put a fresh slab at rest into a slot of every train."""
+        self.slab_design.reshape(self._whole, -1)[:, slot] = design
+        N, K = self.slab_dofs, self.half_width
+        whole = self.slab.reshape(self._whole, -1, N + 2 * K, at.SLAB_ROWS, 8)
+        whole[:, slot // 8, :, :, slot % 8] = 0.0
+
+    def clear(self, train: int) -> None:
+        """Take a train whose numbers ran away out of the way: nothing moves, no forces."""
+        c, t = divmod(train, self.lanes // 2)
+        self.rail.reshape(-1, self._padded * at.RAIL_ROWS, self.lanes)[c, :, 2 * t : 2 * t + 2] = 0.0
+        chunks = len(self.rail) // (self._padded * at.RAIL_ROWS)
+        seats = self.seat.reshape(chunks, -1, seat_rows.N_SEAT, self.lanes)
+        seats[c, :, : seat_rows.FACTOR, 2 * t : 2 * t + 2] = 0.0
+        for array in (self.slab, self.slab_seat, self.car):
+            array.reshape(self._whole, -1)[train] = 0.0
+        self.under.reshape(chunks, -1, self.lanes)[c, :, 2 * t : 2 * t + 2] = 0.0
 
     @property
     def _padded(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -123,13 +123,16 @@ class RailTables:
         """Take over the numbers of tables made at another speed, in place.
 
         Raises:
-            ValueError: The rows' lengths have changed: bind anew.
+            ValueError: The wheels' rows have become longer than there is room for: bind anew.
         """
-        for name in (f.name for f in fields(self)):
-            mine, theirs = getattr(self, name), getattr(new, name)
-            if mine.shape != theirs.shape:
-                raise ValueError(f"{name}: shape {theirs.shape} must be {mine.shape}")
-            mine[...] = theirs
+        needed, W = int(new.wheel_place[:, at.ROWS_COUNT].max()), len(self.wheel_place)
+        mine = self.wheel_rows.reshape(W, -1, at.N_WHEEL_FUNCTION)
+        if needed > mine.shape[1]:
+            raise ValueError(f"wheel rows: {needed} functions, there is room for {mine.shape[1]}")
+        mine[...] = 0.0
+        mine[:, :needed] = new.wheel_rows.reshape(W, -1, at.N_WHEEL_FUNCTION)[:, :needed]
+        self.coefficient[...], self.coupling[...] = new.coefficient, new.coupling
+        self.wheel_place[...] = new.wheel_place
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,3 +349,7 @@ class CarTables:
             element_place=place[element_index],
             wheelset_compliance=compliance,
         )
+
+    def refill(self, new: CarTables) -> None:
+        """Take over the numbers of tables made at another speed, in place."""
+        self.columns[...], self.wheelset_compliance[...] = new.columns, new.wheelset_compliance
