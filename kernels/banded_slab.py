@@ -14,7 +14,7 @@ from tiengine.kernels.types import Array, Template
 
 @ti.func
 def felt(i: int, dofs: int, u: Template, v: Template, constants: Array):
-    """k u + c v of one coordinate as its fastenings feel it; the last two coordinates are lateral."""
+    """K u + c v of one coordinate as its fastenings feel it; the last two coordinates are lateral."""
     k, c = constants[layout.K_VERTICAL], constants[layout.C_VERTICAL]
     if i >= dofs - 2:
         k, c = constants[layout.K_LATERAL], constants[layout.C_LATERAL]

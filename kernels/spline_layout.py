@@ -12,8 +12,8 @@ eight *slots* (slabs in memory) of one train; a vector of a vehicle's array eigh
 W, THETA_Y, V_LATERAL, THETA_Z, THETA_X = range(5)
 """Fields of a rail, in this order; the first two are the vertical block, the others the lateral one."""
 
-# Rows of rails, slabs and cars: at t_n between steps, the iterate at t_{n+1} within one; the predictors; -(C v~ + K u~),
-# for cars the acceleration that it makes, with gravity's.
+# Rows of rails, slabs and cars: at t_n between steps, the iterate at t_{n+1} within one; the predictors;
+# -(C v~ + K u~), for cars the acceleration that it makes.
 U, V, A, U_PREDICTED, V_PREDICTED, LINEAR = range(6)
 
 # Rails only: the forward result, then forces on w, v and theta_x of the seats (three fields, so it comes last).
@@ -73,7 +73,7 @@ SEATS_STAGE, PULL_STAGE, EXCHANGE_STAGE, SEAT_FORCE_STAGE = 1, 2, 4, 8
 FORWARD_STAGE, CONTACT_STAGE, BACKWARD_STAGE, SLAB_STAGE, CAR_STAGE, PREDICT_STAGE = 16, 32, 64, 128, 256, 512
 ALL_STAGES = 1023
 
-# Columns of a span of the knots: its rear and front end [m], four functions' c0..c3 in s - rear end, the first's number.
+# Columns of a span of the knots: rear and front end [m], four functions' c0..c3 in s - rear end, the first's number.
 SPAN_REAR, SPAN_FRONT, SPAN_POLYNOMIALS, SPAN_FIRST, N_SPAN = 0, 1, 2, 18, 19
 
 # A seat touches at most so many functions.

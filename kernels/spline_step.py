@@ -1,3 +1,4 @@
+# mypy: disable-error-code="valid-type, index"
 """Whole time steps of the spline engine in one launch (``spline_layout`` has the arrays).
 
 A step t_n -> t_{n+1} of a chunk of trains, which stays in the cache meanwhile; a is the iterate of the acceleration:
@@ -137,7 +138,7 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
         bed_motion: Reals2,
         pressure: Reals3,
     ):
-        """Steps of all chunks, chunk by chunk. Arrays as in ``tiengine.engine.spline_arrays``."""
+        """Steps of all chunks, chunk by chunk. Arrays as in ``tiengine.engine.spline_step``."""
         ti.loop_config(serialize=True)
         for chunk_step in range(size[at.CHUNKS] * job[at.STEPS]):
             c = chunk_step // job[at.STEPS]
@@ -148,7 +149,6 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
             base2 = constants[layout.HALF_BASE] * constants[layout.HALF_BASE]
             first = c * (n + 2 * at.REACH) + at.REACH
             per_slab, groups = dims[layout.SEATS_PER_SLAB], size[at.GROUPS]
-            train_slab = groups * (dofs + 2 * K)  # places a train
             train_car = size[at.CARS] * at.CAR_ROWS * blocks  # vectors a train
             b0 = c * trains_a_chunk
             b_end = ti.min(b0 + trains_a_chunk, dims[layout.TRAINS])

@@ -109,7 +109,9 @@ def rail_without_change(
 
 
 @ti.func
-def wheelset_without_change(b: int, w: int, start: int, constants: Array, wheelset_place: Array, car: Array, blocks: Template):
+def wheelset_without_change(
+    b: int, w: int, start: int, constants: Array, wheelset_place: Array, car: Array, blocks: Template
+):
     """Wheelset's coordinates and rates at the step's end if no wheel changed the force it has now."""
     x, dx = ti.Vector.zero(ti.f64, 5), ti.Vector.zero(ti.f64, 5)
     for m in ti.static(range(5)):
@@ -122,8 +124,8 @@ def wheelset_without_change(b: int, w: int, start: int, constants: Array, wheels
 
 @ti.func
 def add_wheelset_change(
-    b: int, w: int, start: int, before: Template, wheelset_place: Array, wheelset_force: Array, car_columns_start: Array,
-    columns: Array, car: Array, blocks: Template,
+    b: int, w: int, start: int, before: Template, wheelset_place: Array, wheelset_force: Array,
+    car_columns_start: Array, columns: Array, car: Array, blocks: Template,
 ):  # fmt: skip
     """Add A^-1 times the change of a wheelset's contact forces to its car's acceleration."""
     per_car = at.CAR_ROWS * blocks * 8

@@ -80,7 +80,7 @@ def add_number(car: Array, place: int, x: float):
 
 @ti.func
 def record_bodies(b: int, row: int, start: int, place: Array, car: Array, body_record: Array, blocks: Template):
-    """Displacement, velocity, acceleration of a train's bodies; ``start`` is its first number, ``place`` by coordinate."""
+    """Motion of a train's bodies: rows U, V, A. ``start`` is the train's first number, ``place`` by coordinate."""
     for kind in range(3):
         for i in range(body_record.shape[3]):
             body_record[b, row, kind, i] = number(car, start + kind * blocks * 8 + place[i])

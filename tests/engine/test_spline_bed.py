@@ -9,7 +9,8 @@ from tiengine.kernels import layout as at
 from tiengine.kernels import spline_layout as sl
 
 from ..models import V350, paper_model
-from .spline_bed import make_bed, motion_of
+from .spline_bed import make_bed
+from .spline_reference import motion_of
 
 DT = 1e-4
 

@@ -9,12 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
-from tiengine.kernels.contact import ITERATE_TOLERANCE
 from tiengine.kernels import spline_layout as sl
+from tiengine.kernels.contact import ITERATE_TOLERANCE
 from tiengine.engine.equilibrium import evaluate_contact
 
 from ..models import V350, paper_model
-from .spline_bed import Bed, Motion, make_bed, motion_of, reference_pass, with_trains
+from .spline_bed import Bed, make_bed, with_trains
+from .spline_reference import Motion, motion_of, reference_pass
 
 DT = 2e-4
 ROUNDING = 1e-11  # condition of the rails' blocks 1e3 at most, of the train's 1e4

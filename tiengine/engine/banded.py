@@ -1,4 +1,4 @@
-"""Banded blocks for the sweeps: factors without pivoting, coefficients in the kernels' order, one-sided rows and columns.
+"""Banded blocks for the sweeps: factors, coefficients in the kernels' order, one-sided rows and columns.
 
 A = L U by rows; the blocks of the rails and slabs are dominated by their mass and need no pivoting (condition 14-40).
 """
@@ -18,6 +18,7 @@ from tiengine.kernels.banded_lu import factorise
 __all__ = ["BandedBlock", "Factors", "WheelRows", "rail_coefficients", "wheel_rows"]
 
 NEGLIGIBLE = 1e-14  # of the largest entry: where a wheel's one-sided rows and columns are cut
+ROOM = 12  # functions more than a wheel's rows need now: they change with the speed
 FIELDS = (2, 3)  # of the vertical and the lateral block
 
 
@@ -86,8 +87,8 @@ class Factors:
 
     @property
     def half_width(self) -> int:
-        """k."""
-        return self.band.shape[1] // 2
+        """K."""
+        return int(self.band.shape[1] // 2)
 
     @property
     def inverse_diagonal(self) -> NDArray[np.float64]:
@@ -195,9 +196,7 @@ class WheelRows:
     coupling: NDArray[np.float64]
 
 
-def wheel_rows(
-    factors: tuple[Factors, Factors], first: NDArray[np.intp], shape: NDArray[np.float64]
-) -> WheelRows:
+def wheel_rows(factors: tuple[Factors, Factors], first: NDArray[np.intp], shape: NDArray[np.float64]) -> WheelRows:
     """Rows and columns for wheels that stand still.
 
     Args:
@@ -234,18 +233,18 @@ def wheel_rows(
 
 def _cut(rows: NDArray[np.float64], first: NDArray[np.intp], coupling: NDArray[np.float64]) -> WheelRows:
     """Leave out what is negligible: far functions of the rows, wheels that do not feel each other."""
-    n, W, _ = rows.shape
+    W = rows.shape[1]
     largest = np.abs(rows).max(axis=(0, 1))
-    felt = (np.abs(rows) > NEGLIGIBLE * np.where(largest > 0.0, largest, 1.0)).any(axis=2)
+    felt = np.any(np.abs(rows) > NEGLIGIBLE * np.where(largest > 0.0, largest, 1.0), axis=2)
     place = np.zeros((W, at.N_WHEEL_PLACE), dtype=np.int32)
-    near = (np.abs(coupling) > NEGLIGIBLE * np.abs(coupling).max(axis=(0, 1, 2))).any(axis=(1, 3, 4))
+    near = np.any(np.abs(coupling) > NEGLIGIBLE * np.abs(coupling).max(axis=(0, 1, 2)), axis=(1, 3, 4))
     for w in range(W):
         last = int(np.flatnonzero(felt[:, w]).max())
         place[w, at.ROWS_FIRST], place[w, at.ROWS_COUNT] = first[w], last + 1 - first[w]
         place[w, at.WHEEL_FIRST] = first[w]
         wheels = np.flatnonzero(near[w])
         place[w, at.COUPLED_FIRST], place[w, at.COUPLED_END] = wheels.min(), wheels.max() + 1
-    longest = int(place[:, at.ROWS_COUNT].max())
+    longest = min(len(rows), int(place[:, at.ROWS_COUNT].max()) + ROOM)
     short = np.zeros((W, longest, at.N_WHEEL_FUNCTION))
     for w in range(W):
         count = place[w, at.ROWS_COUNT]

@@ -10,14 +10,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from tiengine.engine.banded import BandedBlock
-from tiengine.engine.spline_arrays import CarTables, RailTables, SeatTables, SlabTables, Spans
+from tiengine.engine.spline_tables import CarTables, RailTables, SeatTables, SlabTables, Spans
 from tiengine.kernels import spline_layout as at
 from tiengine.model.constant_data import slab_operators
 from tiengine.model.spline_model import SplineModel
 from tiengine.track.pieces import Pieces
 from tiengine.vehicle.train import TrainModel
 
-__all__ = ["SplineTables"]
+__all__ = ["ModelTables"]
 
 Matrix: TypeAlias = "sp.csr_array"
 
@@ -51,7 +51,7 @@ class MovingBlock:
 
 
 @dataclass(frozen=True, eq=False)
-class SplineTables:
+class ModelTables:
     """All tables of a group of trains.
 
     Attributes:
@@ -70,7 +70,7 @@ class SplineTables:
     cars: CarTables
 
     @classmethod
-    def of(cls, model: SplineModel) -> SplineTables:
+    def of(cls, model: SplineModel) -> ModelTables:
         """Make the tables at the model's speed."""
         g = model.ingredients
         spans = _spans(model.functions.displacement)
@@ -95,9 +95,7 @@ class SplineTables:
     def factor(self, V: float) -> None:
         """Make the tables that depend on the speed V [m/s] again."""
         self.rails.refill(_rails(self.model, self.spans, self.blocks, V))
-        cars = _cars(self.model, V)
-        self.cars.columns[...] = cars.columns
-        self.cars.wheelset_compliance[...] = cars.wheelset_compliance
+        self.cars.refill(_cars(self.model, V))
 
 
 def _spans(functions: Pieces) -> Spans:

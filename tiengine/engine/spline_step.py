@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.engine.spline_arrays import CarTables, RailTables, SeatTables, SlabTables, Spans, SplineState
+from tiengine.engine.spline_arrays import SplineArrays
+from tiengine.engine.spline_tables import RailTables, SeatTables, SlabTables, Spans
 from tiengine.engine.vector_mode import VectorLaunch
 from tiengine.kernels import layout
 from tiengine.kernels import spline_layout as at
@@ -94,7 +95,7 @@ class SplineStep:
 
     def __init__(
         self,
-        state: SplineState,
+        state: SplineArrays,
         dims: Ints,
         constants: Floats,
         passes: int,
@@ -150,8 +151,8 @@ class SplineStep:
             state.under, rails.wheel_place, rails.wheel_shape, rails.wheel_rows, contact.wheel, contact.table,
             irregularity, cars.wheelset_compliance, rails.coupling, contact.contact, contact.force,
             contact.wheelset_force, contact.rail_force, contact.iterations, wheel_record,
-            body_record, bed.index, bed.shape, bed.weight, bed.factor, bed.rest, bed.lateral_K, bed.lateral_C, bed.numbers,
-            np.zeros((3, slabs.dofs)), bed.pressure,
+            body_record, bed.index, bed.shape, bed.weight, bed.factor, bed.rest, bed.lateral_K, bed.lateral_C,
+            bed.numbers, np.zeros((3, slabs.dofs)), bed.pressure,
         )  # fmt: skip
         vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, state.car,
                    cars.columns, cars.load)  # fmt: skip

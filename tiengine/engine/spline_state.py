@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.engine.spline_arrays import SplineState as Arrays
+from tiengine.engine.model_tables import ModelTables
+from tiengine.engine.spline_arrays import SplineArrays
 from tiengine.engine.spline_step import Bed, Contact
-from tiengine.engine.spline_tables import SplineTables
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
 from tiengine.engine.vector_mode import lanes_for
 from tiengine.kernels import spline_layout as at
@@ -26,7 +26,6 @@ __all__ = ["SplineState"]
 
 ROWS = {DISPLACEMENT: at.U, VELOCITY: at.V, ACCELERATION: at.A}
 FIELDS = {"vertical": slice(at.W, at.THETA_Y + 1), "lateral": slice(at.V_LATERAL, at.THETA_X + 1)}
-NOTHING = 1e300  # for extremes; the kernel is compiled without regard for infinities
 
 
 @dataclass(eq=False)
@@ -35,14 +34,14 @@ class SplineState(State):
 
     Attributes:
         tables: Constant data and tables.
-        held: Arrays of rails, slabs and cars.
+        held: SplineArrays of rails, slabs and cars.
         wheels: Arrays of the contact.
         bed: Bed of the slabs and its pressures.
         first_seat, first_slab: Rear seat and slab of the window.
     """
 
-    tables: SplineTables
-    held: Arrays
+    tables: ModelTables
+    held: SplineArrays
     wheels: Contact
     bed: Bed
     first_seat: int = -1
@@ -56,9 +55,9 @@ class SplineState(State):
             model: Constant data.
             lanes: Of the rails' vectors; by default as many as suit the number of trains.
         """
-        g, tables = model.ingredients, SplineTables.of(model)
+        g, tables = model.ingredients, ModelTables.of(model)
         B, W = g.trains, len(g.wheel_s)
-        held = Arrays.at_rest(
+        held = SplineArrays.at_rest(
             B, lanes or lanes_for(B), model.functions.count, g.seats, W, g.slots, tables.slabs, tables.cars
         )
         wheels = Contact(
@@ -74,9 +73,7 @@ class SplineState(State):
             model.bed_index, model.bed_shape, model.bed_weight, model.bed_factor, model.bed_rest,
             model.bed_lateral_K, model.bed_lateral_C, model.bed_numbers, np.zeros((B, g.slots, 2)),
         )  # fmt: skip
-        state = cls(tables, held, wheels, bed)
-        state._forget_extremes()
-        return state
+        return cls(tables, held, wheels, bed)
 
     @property
     def iterations(self) -> NDArray[np.int32]:  # type: ignore[override]
@@ -112,7 +109,7 @@ class SplineState(State):
         """Widen extremes by the seats' forces of all steps since the last call."""
         np.minimum(smallest, self.held.seats(seats.SMALLEST, 3), out=smallest)
         np.maximum(largest, self.held.seats(seats.LARGEST, 3), out=largest)
-        self._forget_extremes()
+        self.held.forget_extremes()
 
     def body_motion(self, kind: int) -> Reals:
         """Motion of the bodies, shape (B, 5 bodies)."""
@@ -218,12 +215,8 @@ class SplineState(State):
             slots = self.slots
             fresh = range(max(first_slab, self.first_slab + slots), first_slab + slots)
             for slab in fresh if self.first_slab >= 0 else range(first_slab, first_slab + slots):
-                self.held.renew_slab(slab % slots, ingredients.designs.of_slab.get(slab, 0))
+                self.held.enter_slab(slab % slots, ingredients.designs.of_slab.get(slab, 0))
             self.first_slab = first_slab
-
-    def _forget_extremes(self) -> None:
-        self.held.fill_seats(seats.SMALLEST, 3, NOTHING)
-        self.held.fill_seats(seats.LARGEST, 3, -NOTHING)
 
 
 def _first_contact(B: int, W: int) -> Reals:
