@@ -8,7 +8,7 @@ from functools import lru_cache
 from tiengine.engine import backend
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.kinds import make_stepper, state_at_rest
-from tiengine.engine.stability import TOLERATED_GROWTH, energy_growth
+from tiengine.engine.stability import of_trains, step_growth, with_stiffest_seats
 from tiengine.engine.vector_mode import lanes_for
 from tiengine.irregularity.irregularity import IrregularityParams, check_step, shortest_wavelength
 from tiengine.model.from_scenario import ingredients
@@ -18,11 +18,15 @@ from tiengine.model.spline_model import DivergingPassesError
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario, check_wavelength, to_toml
 from tiengine.scenario.tables import Output
+from tiengine.track.defects import largest_factor
 
 __all__ = ["AUTO_STEPS", "prepare"]
 
 AUTO_STEPS = (2e-4, 1e-4, 5e-5, 2.5e-5)
 """Steps that "auto" tries [s], the longest first: 2e-4 s keeps wheel forces within 0.3 % of their peak (README)."""
+
+MORE_PASSES = 2
+"""Passes that advice tries beyond those of the scenario."""
 
 
 def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) -> tuple[Model, float]:
@@ -43,8 +47,8 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     wanted = scenario.numerics.time_step
     V = scenario.train.speed.at(scenario.rear + scenario.centre_in_window)[0]
     fastest = scenario.train.speed.fastest
-    jit, growth = 0.0, ""
     shortest = shortest_wavelength(scenario.irregularity)
+    reason = ""
     for dt in AUTO_STEPS if wanted == "auto" else (float(wanted),):
         try:
             check_wavelength(scenario, dt)
@@ -53,24 +57,41 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
             if wanted == "auto" and dt != AUTO_STEPS[-1]:
                 continue
             raise
-        parts, lanes = replace(_ingredients(_Key.of(scenario)), newmark=Newmark(dt)), lanes_for(trains)
-        try:
-            model = build_model(parts, fastest)
-        except DivergingPassesError as error:
-            growth = str(error)
-            continue
-        if jit == 0.0:
-            chunk = Chunk.empty(parts, 1, 1, 1)
-            jit = make_stepper(model, state_at_rest(model, lanes), chunk, public=public_launch).compile()
-        found = energy_growth(model, fastest, lanes)
-        if found <= TOLERATED_GROWTH:
-            if trains > 1 or V != fastest:
-                model = build_model(replace(parts, trains=trains), V)
-            return model, jit
-        growth = f"free vibration of the track grows by a factor {found:.3g} within 80 steps"
-    raise InputError(
-        f"numerics.time_step = {wanted}: unstable; {growth}; choose a shorter step, more passes or fewer trial functions"
-    )
+        parts = replace(_ingredients(_Key.of(scenario)), newmark=Newmark(dt))
+        model, reason = _tried(scenario, parts, trains)
+        if model is not None:
+            model = of_trains(model, trains) if V == fastest else build_model(replace(parts, trains=trains), V)
+            state = state_at_rest(model, lanes_for(trains))
+            return model, make_stepper(model, state, Chunk.empty(parts, 1, 1, 1), public=public_launch).compile()
+    raise InputError(f"numerics.time_step = {wanted}: unstable; {reason}; {_advice(scenario, parts, trains)}")
+
+
+def _tried(scenario: Scenario, parts: Ingredients, trains: int) -> tuple[Model | None, str]:
+    """Model for the largest speed if its step stands the trial, else how it fails."""
+    V, stiffest = scenario.train.speed.fastest, largest_factor(scenario.track.failed_fastenings)
+    steps = scenario.train.distance / (V * parts.newmark.dt)
+    try:
+        model = build_model(parts, V)
+        tried = model if stiffest == 1.0 else build_model(with_stiffest_seats(parts, stiffest), V)
+    except DivergingPassesError as error:
+        return None, str(error)
+    growth = step_growth(tried, V, steps, lanes_for(trains))
+    if growth.tolerable(steps):
+        return model, ""
+    return None, f"an oscillation grows by a factor {growth.over(100):.3g} within 100 steps"
+
+
+def _advice(scenario: Scenario, parts: Ingredients, trains: int) -> str:
+    """The longest shorter step and the least more passes that stand the trial."""
+    dt, passes = parts.newmark.dt, parts.passes
+    steps = ((f"numerics.time_step = {d:g}", replace(parts, newmark=Newmark(d))) for d in AUTO_STEPS if d < 0.9 * dt)
+    more = ((f"numerics.passes = {n}", replace(parts, passes=n)) for n in range(passes + 1, passes + 1 + MORE_PASSES))
+    stable = [
+        next((words for words, changed in changes if _tried(scenario, changed, trains)[0]), None)
+        for changes in (steps, more)
+    ]
+    found = " or ".join(words for words in stable if words)
+    return f"{found} is stable" if found else "choose fewer trial functions or softer fastenings"
 
 
 @dataclass(frozen=True)
