@@ -3,7 +3,7 @@
 A step that is unstable by a little lets the forces alternate from one step to the next, growing for thousands of steps
 before anything runs away. Real motion does not look so: the irregularity must be resolved by eight steps a wave, and
 the waves of an impact die out. So a few successive steps are looked at once in 10 ms: of an alternating force the sum
-of squared second differences is four times that of the first differences, of a sine with eight steps a period 0.6 times.
+of squared second differences is four times that of first differences, of a sine with eight steps a period 0.6 times.
 """
 
 from __future__ import annotations
