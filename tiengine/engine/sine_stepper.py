@@ -37,7 +37,9 @@ class SineStepper(Stepper):
 
     state: SineState
 
-    def __init__(self, model: SineModel, state: SineState, chunk: Chunk, *, parallel: bool = False, public: bool = False):
+    def __init__(
+        self, model: SineModel, state: SineState, chunk: Chunk, *, parallel: bool = False, public: bool = False
+    ):
         """Bind.
 
         Args:
