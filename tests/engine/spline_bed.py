@@ -16,10 +16,10 @@ from tiengine.engine.spline_step import Bed as SlabBed
 from tiengine.engine.spline_step import Contact, SplineStep, Suspension
 from tiengine.engine.spline_tables import CarTables, RailTables, SeatTables, SlabTables, Spans, spans_of
 from tiengine.engine.vector_mode import lanes_for
-from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes
 from tiengine.kernels import layout as at
 from tiengine.kernels import spline_layout as sl
 from tiengine.kernels.wheel_rail import COS, N_CONTACT
+from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes
 from tiengine.model.sine_model import SineModel as Model
 from tiengine.vehicle.train import TrainModel
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from tiengine.model.implicit_seats import seat_shapes
 from tiengine.kernels import layout as at
 from tiengine.kernels import spline_layout as sl
 from tiengine.kernels.spline_seats import FACTOR
+from tiengine.model.implicit_seats import seat_shapes
 
 from .spline_bed import Bed
 

@@ -33,7 +33,9 @@ def test_a_bed_without_tension_carries_no_less_than_nothing() -> None:
     """Slabs thrown up: the pressure stops at zero, and the bed's missing pull lets them rise further."""
     heights = []
     for no_tension in (False, True):
-        given = paper_model(dt=DT, mortar=paper_model(dt=DT).ingredients.mortar.model_copy(update={"no_tension": no_tension}))
+        given = paper_model(
+            dt=DT, mortar=paper_model(dt=DT).ingredients.mortar.model_copy(update={"no_tension": no_tension})
+        )
         bed = make_bed(given, V350)
         bed.start(2, 0.0)
         bed.state.slabs(sl.V)[..., 0:-2:3] = -0.5  # m/s, upwards, every node's w

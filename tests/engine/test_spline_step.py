@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tiengine.engine.equilibrium import evaluate_contact
 from tiengine.kernels import layout as at
 from tiengine.kernels import spline_layout as sl
 from tiengine.kernels.contact import ITERATE_TOLERANCE
-from tiengine.engine.equilibrium import evaluate_contact
 
 from ..models import V350, paper_model
 from .spline_bed import Bed, make_bed, with_trains

@@ -30,9 +30,7 @@ def state_at_rest(model: Model, lanes: int | None = None) -> State:
     raise TypeError(f"no step for a {type(model).__name__}")
 
 
-def make_stepper(
-    model: Model, state: State, chunk: Chunk, *, parallel: bool = False, public: bool = False
-) -> Stepper:
+def make_stepper(model: Model, state: State, chunk: Chunk, *, parallel: bool = False, public: bool = False) -> Stepper:
     """Bind the step of a model to a state and to buffers.
 
     Args:

@@ -37,7 +37,9 @@ class SineStepper(Stepper):
 
     state: SineState
 
-    def __init__(self, model: SineModel, state: SineState, chunk: Chunk, *, parallel: bool = False, public: bool = False):
+    def __init__(
+        self, model: SineModel, state: SineState, chunk: Chunk, *, parallel: bool = False, public: bool = False
+    ):
         """Bind.
 
         Args:
@@ -64,11 +66,6 @@ class SineStepper(Stepper):
             {block: _rows(state.view(row, block)) for block in _BLOCKS} for row in (at.F, at.A)
         )
         self.bind()
-
-    @property
-    def seat_extremes_due(self) -> bool:
-        """After every step: nothing keeps them."""
-        return True
 
     def _stages(self) -> Iterator[Stage]:
         """Stages of the step in their order; :mod:`tiengine.kernels.step` gives the equations."""

@@ -20,7 +20,7 @@ from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.state import DISPLACEMENT, VELOCITY, State
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.vector_mode import lanes_for
 from tiengine.model.constant_data import Model, shared_arrays
 from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.parameters.arrays import Reals
@@ -48,8 +48,10 @@ TOLERATED_GROWTH = 10.0
 """Growth of an oscillation over the run: rounding and contact leave a newton at most to grow from."""
 BEATING = 1.05
 """Later over earlier energy without growth: undamped pinned-pinned vibration keeps its energy but for beating."""
-OVERFLOW = 1e-2
-"""Sum of the squares of all rates of the track at which a trial ends: a million times that of the disturbance."""
+OVERFLOW = 1e8
+"""Squared disturbance over that at the start at which a trial ends."""
+INFINITE = 1e300  # that of numbers that have run away
+CHECKED = 20  # steps from one check for this to the next
 
 
 @dataclass(frozen=True)
@@ -102,8 +104,9 @@ def step_growth(model: Model, V: float, steps: float, lanes: int | None = None) 
         model: Constant data, made for V.
         V: Speed [m/s].
         steps: Of the run.
-        lanes: See :func:`tiengine.engine.kinds.state_at_rest`.
+        lanes: See :func:`tiengine.engine.kinds.state_at_rest`; by default those of one train.
     """
+    lanes = lanes or lanes_for(1)
     count = int(np.clip(SHARE * steps, SHORTEST, LONGEST))
     alone = _growth(of_trains(model, 1), V, count, lanes)
     if not alone.tolerable(steps):
@@ -112,7 +115,7 @@ def step_growth(model: Model, V: float, steps: float, lanes: int | None = None) 
     return alone if rolling.tolerable(steps) else rolling
 
 
-def _growth(model: Model, V: float, count: int, lanes: int | None) -> Growth:
+def _growth(model: Model, V: float, count: int, lanes: int) -> Growth:
     """Growth in a trial of one train lifted off, or of two that roll."""
     g = model.ingredients
     state, chunk = state_at_rest(model, lanes), Chunk.empty(g, count, 1, 1)
@@ -123,26 +126,21 @@ def _growth(model: Model, V: float, count: int, lanes: int | None) -> Growth:
     if not _begin(model, state, V):
         return Growth(0.0, 0.0)
     energy = _Energy(model, state)
-    middle = int(EARLIER * count)
+    earlier, later, apart = int(EARLIER * count), count, count - int(EARLIER * count)
+    first, peaks = energy.disturbance(), {earlier: 0.0, later: 0.0}
     with np.errstate(all="ignore"):
-        found = [_peak(stepper, energy, steps) for steps in (range(middle), range(middle, count))]
-    apart = count - middle
-    if not all(np.isfinite(found)):
-        return Growth(np.log(1e6) / count, 0.0)
-    return Growth(float(0.5 * np.log(found[1] / found[0]) / apart), float(0.5 * np.log(BEATING) / apart))
-
-
-def _peak(stepper: Stepper, energy: _Energy, steps: range) -> float:
-    """Take steps; largest energy of the disturbance within the last ones, infinite if it overflows."""
-    peak = 0.0
-    energy.begin()
-    for i in steps:
-        stepper.step(i)
-        if i >= steps.stop - SAMPLED:
-            peak = max(peak, energy())
-        elif i % 50 == 0 and not energy.disturbance() < OVERFLOW:
-            return float("inf")
-    return peak if np.isfinite(peak) else float("inf")
+        for i in range(count):
+            stepper.step(i)
+            near = earlier if i < earlier else later
+            if i >= near - SAMPLED:
+                peaks[near] = max(peaks[near], energy())
+            elif i % CHECKED == 0:
+                energy.begin()
+                grown = energy.disturbance() / first
+                if not grown < OVERFLOW:
+                    return Growth(0.5 * np.log(grown if np.isfinite(grown) else INFINITE) / (i + 1), 0.0)
+        rate = 0.5 * np.log(peaks[later] / peaks[earlier]) / apart
+    return Growth(float(rate) if np.isfinite(rate) else np.inf, 0.5 * np.log(BEATING) / apart)
 
 
 def _begin(model: Model, state: State, V: float) -> bool:

@@ -48,7 +48,7 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     V = scenario.train.speed.at(scenario.rear + scenario.centre_in_window)[0]
     fastest = scenario.train.speed.fastest
     shortest = shortest_wavelength(scenario.irregularity)
-    reason = ""
+    jit, reason = 0.0, ""
     for dt in AUTO_STEPS if wanted == "auto" else (float(wanted),):
         try:
             check_wavelength(scenario, dt)
@@ -57,41 +57,63 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
             if wanted == "auto" and dt != AUTO_STEPS[-1]:
                 continue
             raise
-        parts = replace(_ingredients(_Key.of(scenario)), newmark=Newmark(dt))
-        model, reason = _tried(scenario, parts, trains)
-        if model is not None:
-            model = of_trains(model, trains) if V == fastest else build_model(replace(parts, trains=trains), V)
-            state = state_at_rest(model, lanes_for(trains))
-            return model, make_stepper(model, state, Chunk.empty(parts, 1, 1, 1), public=public_launch).compile()
-    raise InputError(f"numerics.time_step = {wanted}: unstable; {reason}; {_advice(scenario, parts, trains)}")
+        parts, lanes = replace(_ingredients(_Key.of(scenario)), newmark=Newmark(dt)), lanes_for(trains)
+        try:
+            model = build_model(parts, fastest)
+        except DivergingPassesError as error:
+            reason = str(error)
+            continue
+        if jit == 0.0:
+            chunk = Chunk.empty(parts, 1, 1, 1)
+            jit = make_stepper(model, state_at_rest(model, lanes), chunk, public=public_launch).compile()
+        reason = _instability(scenario, model, lanes)
+        if not reason:
+            if V == fastest:
+                return of_trains(model, trains), jit
+            return build_model(replace(parts, trains=trains), V), jit
+    raise InputError(f"numerics.time_step = {wanted}: unstable; {reason}; {_advice(scenario, parts, lanes)}")
 
 
-def _tried(scenario: Scenario, parts: Ingredients, trains: int) -> tuple[Model | None, str]:
-    """Model for the largest speed if its step stands the trial, else how it fails."""
+def _instability(scenario: Scenario, model: Model, lanes: int) -> str:
+    """How the step of a model fails the trial over the scenario's run; empty if it does not."""
     V, stiffest = scenario.train.speed.fastest, largest_factor(scenario.track.failed_fastenings)
-    steps = scenario.train.distance / (V * parts.newmark.dt)
+    steps = scenario.train.distance / (V * model.ingredients.newmark.dt)
     try:
-        model = build_model(parts, V)
-        tried = model if stiffest == 1.0 else build_model(with_stiffest_seats(parts, stiffest), V)
+        tried = model if stiffest == 1.0 else build_model(with_stiffest_seats(model.ingredients, stiffest), V)
     except DivergingPassesError as error:
-        return None, str(error)
-    growth = step_growth(tried, V, steps, lanes_for(trains))
+        return str(error)
+    growth = step_growth(tried, V, steps, lanes)
     if growth.tolerable(steps):
-        return model, ""
-    return None, f"an oscillation grows by a factor {growth.over(100):.3g} within 100 steps"
+        return ""
+    seats = "" if stiffest == 1.0 else f" on seats stiffened by {stiffest:g}"
+    return f"an oscillation{seats} grows by a factor {growth.over(100):.3g} in 100 steps"
 
 
-def _advice(scenario: Scenario, parts: Ingredients, trains: int) -> str:
+def _advice(scenario: Scenario, parts: Ingredients, lanes: int) -> str:
     """The longest shorter step and the least more passes that stand the trial."""
-    dt, passes = parts.newmark.dt, parts.passes
-    steps = ((f"numerics.time_step = {d:g}", replace(parts, newmark=Newmark(d))) for d in AUTO_STEPS if d < 0.9 * dt)
-    more = ((f"numerics.passes = {n}", replace(parts, passes=n)) for n in range(passes + 1, passes + 1 + MORE_PASSES))
-    stable = [
-        next((words for words, changed in changes if _tried(scenario, changed, trains)[0]), None)
-        for changes in (steps, more)
+    steps = [(f"numerics.time_step = {dt:g}", replace(parts, newmark=Newmark(dt))) for dt in AUTO_STEPS]
+    more = [
+        (f"numerics.passes = {n}", replace(parts, passes=n))
+        for n in range(parts.passes + 1, parts.passes + 1 + MORE_PASSES)
     ]
-    found = " or ".join(words for words in stable if words)
-    return f"{found} is stable" if found else "choose fewer trial functions or softer fastenings"
+    shorter = [(words, changed) for words, changed in steps if changed.newmark.dt < 0.9 * parts.newmark.dt]
+    found = [words for changes in (shorter, more) if (words := _first_stable(scenario, changes, lanes))]
+    if found:
+        return f"{' or '.join(found)} is stable"
+    stiffened = largest_factor(scenario.track.failed_fastenings) > 1.0
+    return f"choose {'smaller factors in track.failed_fastenings' if stiffened else 'fewer trial functions'}"
+
+
+def _first_stable(scenario: Scenario, changes: list[tuple[str, Ingredients]], lanes: int) -> str:
+    """Words of the first change that stands the trial; empty if none does."""
+    for words, changed in changes:
+        try:
+            model = build_model(changed, scenario.train.speed.fastest)
+        except DivergingPassesError:
+            continue
+        if not _instability(scenario, model, lanes):
+            return words
+    return ""
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ class StepOscillation:
             interval: See :meth:`interval`.
             force: Vertical and lateral forces of the wheels [N], shape (B, W, 2, 2).
         """
-        place = step % interval
+        place = (step - 1) % interval
         if place >= WINDOW:
             return False
         self.samples[place] = force

@@ -186,7 +186,7 @@ def _facts(result: Result, train: int) -> Iterator[tuple[str, str]]:
     own = result.facts(train)
     if "window_length" in own:
         yield "window", f"{own['window_length']:g} m"
-    for name in ("seed", "modes", "passes", "slabs", "seats_in_window", "trains_together"):
+    for name in ("seed", "functions", "modes", "passes", "slabs", "seats_in_window", "trains_together"):
         if name in own:
             yield name.replace("_", " "), str(own[name])
     for name, value in attributes.items():
