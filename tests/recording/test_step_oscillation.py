@@ -53,7 +53,7 @@ def test_a_slow_instability_is_found_before_it_reaches_the_load(rate):
     time = found(guiding + growing(2.0, rate, len(n)))
     assert time is not None
     amplitude = 2.0 * np.exp(rate * time / DT)
-    assert 0.02 * LOAD < amplitude < 0.5 * LOAD
+    assert 0.01 * LOAD < amplitude < 0.3 * LOAD
 
 
 def test_seats_that_modulate_an_oscillation_do_not_hide_it():
@@ -81,10 +81,10 @@ def test_blows_on_the_flange_are_left_alone(frequency):
     assert found(real(10000) + ringing) is None
 
 
-def test_white_noise_below_two_per_cent_is_left_alone():
+def test_white_noise_below_one_per_cent_is_left_alone():
     """Its differences alternate as well; forces are not wrong by as much as counts."""
     random = np.random.default_rng(0)
-    assert found(0.01 * LOAD * random.standard_normal(8000)) is None
+    assert found(0.005 * LOAD * random.standard_normal(8000)) is None
 
 
 @pytest.mark.parametrize(("dt", "interval"), [(1e-3, 10), (2e-4, 50), (2.5e-5, 400), (1.5e-3, 8)])

@@ -26,7 +26,7 @@ EVERY = 1e-2
 ALTERNATING = 3.0
 """Squared second differences over squared first ones: the mean of white noise, a sine of 3 steps a period."""
 
-LEAST = 0.02
+LEAST = 0.01
 """Amplitude over the static wheel load from which an oscillation counts: forces are wrong by as much."""
 
 LASTING = 0.1
