@@ -21,7 +21,7 @@ from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.state import DISPLACEMENT, VELOCITY, State
 from tiengine.engine.vector_mode import lanes_for
-from tiengine.model.constant_data import Model, shared_arrays
+from tiengine.model.constant_data import MassAndStiffness, Model, shared_arrays
 from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
@@ -108,14 +108,17 @@ def step_growth(model: Model, V: float, steps: float, lanes: int | None = None) 
     """
     lanes = lanes or lanes_for(1)
     count = int(np.clip(SHARE * steps, SHORTEST, LONGEST))
-    alone = _growth(of_trains(model, 1), V, count, lanes)
+    slab = model.ingredients.designs.matrices[0]
+    plates = sp.csr_array(slab.M), sp.csr_array(slab.K_plate + slab.K_bed)
+    matrices = dict(zip(TRACK, (*model.rails_at_rest, plates), strict=True))
+    alone = _growth(of_trains(model, 1), V, count, lanes, matrices)
     if not alone.tolerable(steps):
         return alone
-    rolling = _growth(of_trains(model, 2), V, min(count, ROLLING), lanes)
+    rolling = _growth(of_trains(model, 2), V, min(count, ROLLING), lanes, matrices)
     return alone if rolling.tolerable(steps) else rolling
 
 
-def _growth(model: Model, V: float, count: int, lanes: int) -> Growth:
+def _growth(model: Model, V: float, count: int, lanes: int, matrices: dict[str, MassAndStiffness]) -> Growth:
     """Growth in a trial of one train lifted off, or of two that roll."""
     g = model.ingredients
     state, chunk = state_at_rest(model, lanes), Chunk.empty(g, count, 1, 1)
@@ -125,7 +128,7 @@ def _growth(model: Model, V: float, count: int, lanes: int) -> Growth:
     stepper.load(X, np.full(count, V), np.zeros(count), np.zeros_like(chunk.irregularity))
     if not _begin(model, state, V):
         return Growth(0.0, 0.0)
-    energy = _Energy(model, state)
+    energy = _Energy(matrices, state)
     earlier, later, apart = int(EARLIER * count), count, count - int(EARLIER * count)
     first, peaks = energy.disturbance(), {earlier: 0.0, later: 0.0}
     with np.errstate(all="ignore"):
@@ -167,11 +170,8 @@ def _begin(model: Model, state: State, V: float) -> bool:
 class _Energy:
     """Energy of the track's disturbance [J]; of its second differences in time for trains that roll."""
 
-    def __init__(self, model: Model, state: State) -> None:
-        self.state = state
-        slab = model.ingredients.designs.matrices[0]
-        plates = sp.csr_array(slab.M), sp.csr_array(slab.K_plate + slab.K_bed)
-        self._matrices = dict(zip(TRACK, (*model.rails_at_rest, plates), strict=True))
+    def __init__(self, matrices: dict[str, MassAndStiffness], state: State) -> None:
+        self.state, self._matrices = state, matrices
         self._before: list[dict[str, Reals]] = []
 
     def begin(self) -> None:
