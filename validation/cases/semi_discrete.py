@@ -1,9 +1,9 @@
 """The engine's semi-discrete equations as one first-order system, for general-purpose ODE solvers.
 
-Written with matrices, apart from the step and its kernels: linear parts from the host's M, C, K; fastenings as springs
-and dampers between a rail's shape at the moving seat and a slab's shape; only the wheel-rail contact and the nonlinear
-suspension elements are evaluated by the engine's kernels. y = (u, du/dt), u = (rails, slabs, vehicle), where a rail's
-coordinates are w, theta_y, v, theta_z, theta_x, N modes each.
+Written with matrices, independently of the step and its kernels: linear parts from the host's M, C, K; fastenings as
+springs and dampers between a rail's shape at the moving seat and a slab's shape; only the wheel-rail contact and the
+nonlinear suspension elements are evaluated by the engine's kernels. y = (u, du/dt), u = (rails, slabs, vehicle), where
+a rail's coordinates are w, theta_y, v, theta_z, theta_x, N modes each.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class SemiDiscrete:
         """Assemble.
 
         Args:
-            model: Gives the matrices.
+            model: Source of the matrices.
             track: Irregularity.
             V: Speed [m/s].
             slabs: All slabs that the window touches, from its beginning to its end.
@@ -55,7 +55,7 @@ class SemiDiscrete:
         self._seats()
 
     def _seats(self) -> None:
-        """The slabs' side of every fastening that can stand in the window, and stiffness and damping."""
+        """Slab side of every fastening that can be in the window, with stiffness and damping."""
         g, sound = self.model.given, self.model.given.designs.matrices[0]
         f, b = g.fastening, g.rail.half_base
         self.seats = np.arange(self.slabs.start * g.slab.fastenings, self.slabs.stop * g.slab.fastenings)
@@ -72,7 +72,7 @@ class SemiDiscrete:
         self.c = np.array([f.vertical_damping, f.vertical_damping, f.lateral_damping])
 
     def shapes(self, t: float) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
-        """Which seats stand in the window at time t, the rails' shape there and its rate -V d/ds."""
+        """Seats in the window at time t, the rails' trial functions there and their rates -V d/ds."""
         s = (self.seats + 0.5) * self.model.given.slab.fastening_pitch - self.V * t
         here = (s > 0.0) & (s < self.model.given.length)
         k = self.model.window.wave_numbers
@@ -97,7 +97,7 @@ class SemiDiscrete:
         return out
 
     def fastenings(self, t: float) -> tuple[NDArray[np.float64], ...]:
-        """As matrices: elongations E u, their rates E u' + F u; with k and c by row."""
+        """Fastenings as matrices: elongations E u, their rates E u' + F u; with k and c by row."""
         here, phi, rate = self.shapes(t)
         E = -self.on_slab[here]
         F, n = np.zeros_like(E), self.modes
@@ -182,7 +182,7 @@ class SemiDiscrete:
         return np.einsum("kwm->wmk", (force[:28] - force[28:]) / (2.0 * NUDGE)[:, None, None])
 
     def _inputs(self) -> list[NDArray[np.float64]]:
-        """What a wheelset's contact feels, as linear in u and in v; shape (2, 28, n) a wheelset."""
+        """Inputs of a wheelset's contact as linear functions of u and v, shape (2, 28, n) per wheelset."""
         out = []
         for w in range(len(self.dof)):
             rows = np.zeros((2, 28, self.n))
@@ -196,7 +196,7 @@ class SemiDiscrete:
         return out
 
     def pack(self, state: State) -> NDArray[np.float64]:
-        """The y of an engine's state whose window begins at the first of the slabs."""
+        """Vector y of an engine's state whose window begins at the first of the slabs."""
         halves = []
         for row in (at.U, at.V):
             vertical, lateral = state.view(row, "vertical")[0], state.view(row, "lateral")[0]

@@ -1,4 +1,4 @@
-"""A stepper that is given way after way to run, and timed; callers keep BLAS on one thread, as runs do."""
+"""A stepper that is timed block by block; callers keep BLAS on one thread, as runs do."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ WARM_UP = 100  # steps
 
 @dataclass(eq=False)
 class Bench:
-    """The step of some trains; writing is not part of it.
+    """Time step of some trains, without writing.
 
     Attributes:
-        scenario: Says how it starts, and what is recorded.
-        stepper: Advances them.
-        tracks: Irregularity under each.
-        recorder: Decides which steps are recorded.
+        scenario: Source of start and recording.
+        stepper: Stepper of the trains.
+        tracks: Irregularity of each train.
+        recorder: Selects the steps to record.
         V: Speed [m/s].
-        done: Steps so far.
+        done: Number of steps so far.
     """
 
     scenario: Scenario
@@ -45,12 +45,12 @@ class Bench:
 
     @classmethod
     def of(cls, scenario: Scenario, given: Ingredients, steps: int) -> Bench:
-        """Set up.
+        """Set up the trains.
 
         Args:
-            scenario: Of one train.
-            given: What the model is made from, trains included.
-            steps: In a block.
+            scenario: Scenario of one train.
+            given: Ingredients of the model, including the trains.
+            steps: Number of steps in a block.
         """
         V = scenario.train.speed.fastest
         model = build_model(given, V)
@@ -68,7 +68,7 @@ class Bench:
         return bench
 
     def block_us(self, steps: int) -> float:
-        """Wall time of a step of all trains [us], mean over a block; loading it included."""
+        """Wall time of a step of all trains [us], mean over a block, including its loading."""
         felt, X = self._ahead(steps)
         clock = time.perf_counter_ns()
         self.stepper.load(X, np.full(steps, self.V), np.zeros(steps), felt)
@@ -81,7 +81,7 @@ class Bench:
         return spent * 1e-3 / steps
 
     def shares(self, steps: int) -> dict[str, float]:
-        """Share of each stage of the step, the largest first."""
+        """Share of each stage of the step, in descending order."""
         timers = StageTimers(self.stepper)
         times = Times(timers.calls)
         felt, X = self._ahead(steps)
@@ -100,6 +100,6 @@ class Bench:
 
 
 def timed_in_turn(benches: Sequence[Bench], rounds: int, steps: int) -> list[float]:
-    """Wall time of a step of each [us], medians over rounds in which all take a block in turn."""
+    """Wall time of a step of each bench [us], medians over rounds in which each runs a block in turn."""
     spent = [[bench.block_us(steps) for bench in benches] for _ in range(rounds)]
     return [float(x) for x in np.median(spent, axis=0)]
