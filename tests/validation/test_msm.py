@@ -82,7 +82,7 @@ def _window(*overrides: str):
 
 @pytest.mark.parametrize("direction", ["vertical_force", "lateral_force"])
 def test_window_and_full_length_agree(direction):
-    """0.2 % of the peak on a rough track at the same modes per metre: what the window's ends change (MODEL 9).
+    """Forces agree within 0.2 % of the peak, the effect of the window's ends, at the same modes per metre (MODEL 9).
 
     No wheel lifts off in these 15 m: at an impact the step errors of both programs would dominate.
     """
@@ -92,8 +92,8 @@ def test_window_and_full_length_agree(direction):
     assert np.abs(full - window).max() < 2e-3 * np.abs(full).max()
 
 
-def test_failed_fastenings_and_a_void_are_felt_alike():
-    """As above on a smooth track, over three failed fastenings and four elements of a slab without mortar."""
+def test_failed_fastenings_and_a_void_act_alike():
+    """They agree likewise over three failed fastenings and four elements without mortar, on a smooth track."""
     defects = (
         "irregularity.spectrum='none'",
         'track.failed_fastenings=[{rail="left", seats=[62, 64], factor=0.0}]',

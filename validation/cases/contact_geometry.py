@@ -26,7 +26,7 @@ __all__ = ["CASES", "draw"]
 
 INDEPENDENT = "independent calculation"
 EUROPE = {"gauge_depth": 0.014, "half_spacing": 0.75, "wheel_radius": 0.46}
-PAIRS = (
+PAIRS: tuple[tuple[str, str, dict[str, float], tuple[float, ...], slice], ...] = (
     ("LMA", "CHN60", {}, (0.0256, 0.0270, 0.0350, 0.0420, 0.0482, 0.0539, 0.0631), slice(0, 6)),
     (
         "LMA",
@@ -44,7 +44,8 @@ AMPLITUDES = np.arange(1.0, 8.0) * 1e-3
 
 
 def _pair(wheel: str, rail: str, settings: dict[str, float]) -> WheelRailPair:
-    return WheelRailPair(load_profile(wheel, "wheel"), load_profile(rail, "rail"), ContactSettings(**settings))
+    placed = ContactSettings(**settings)  # type: ignore[arg-type]
+    return WheelRailPair(load_profile(wheel, "wheel"), load_profile(rail, "rail"), placed)
 
 
 def _stations() -> dict[str, Reals]:

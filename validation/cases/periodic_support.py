@@ -101,7 +101,7 @@ def _prepare(model: Model, V: float, steps: int) -> tuple[State, Chunk, _Loaded,
     stepper = _Loaded(model, state, chunk)
     felt = np.zeros_like(chunk.irregularity)
     felt[..., at.Z_V] = 1.0
-    X = V * model.given.newmark.dt * np.arange(1, steps + 1)
+    X = V * model.given.newmark.dt * np.arange(1.0, steps + 1)
     stepper.load(X, np.full(steps, V), np.zeros(steps), felt)
     chunk.clock[:, at.FIRST_SLAB] = -1000
     return state, chunk, stepper, X

@@ -65,7 +65,7 @@ def _pinned_pinned(pitch: float) -> float:
     spans, modes = 20, 120
     window = RailWindow(_rail(), spans * pitch, modes)
     M, _, K = (matrix.toarray() for matrix in window.vertical(0.0))
-    seats = window.shape(pitch * np.arange(1, spans))
+    seats = window.shape(pitch * np.arange(1.0, spans))
     springs = np.zeros_like(K)
     springs[:modes, :modes] = _seats().stiffness * seats.T @ seats
     with threadpool_limits(1):

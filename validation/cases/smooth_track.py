@@ -60,7 +60,7 @@ def _supported() -> tuple[float, float]:
     count = 2 * STEPS // SLABS
     chunk = Chunk.empty(model, 2 * count, 2 * count, 1)
     stepper = Stepper(model, state, chunk)
-    X = V * DT * np.arange(1, 2 * count + 1)
+    X = V * DT * np.arange(1.0, 2 * count + 1)
     stepper.load(X, np.full(2 * count, V), np.zeros(2 * count), np.zeros_like(chunk.irregularity))
     seats = []
     with threadpool_limits(1):

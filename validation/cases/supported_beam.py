@@ -62,7 +62,7 @@ def _rail_crossing() -> Crossing:
 
 def _times(crossing: Crossing) -> Reals:
     """Instants of the comparison, ends of every hundredth step [s], shape (SAMPLES,)."""
-    return np.arange(1, SAMPLES + 1) * (crossing.duration / SAMPLES)
+    return np.arange(1.0, SAMPLES + 1) * (crossing.duration / SAMPLES)
 
 
 def _coupled(
@@ -101,7 +101,10 @@ def _march(what: str, window: RailWindow, crossing: Crossing, steps: int) -> Rea
     base = padded[0], padded[1]
     place = np.zeros((3, n))
     middle = window.shape(np.array([window.length / 2.0]))[0]
-    u, v, a, found = np.zeros(n), np.zeros(n), np.zeros(n), []
+    found = []
+    u: Reals = np.zeros(n)
+    v: Reals = np.zeros(n)
+    a: Reals = np.zeros(n)
     for step in range(1, steps + 1):
         at = np.array([crossing.V * step * dt])
         place[0, : window.modes], place[1, : window.modes] = window.shape(at)[0], window.shape_slope(at)[0]
@@ -109,7 +112,8 @@ def _march(what: str, window: RailWindow, crossing: Crossing, steps: int) -> Rea
         M, C, K, load = _coupled(what, crossing, base, *place)
         u = u + dt * v + (0.5 - newmark.beta) * dt**2 * a
         v = v + (1.0 - newmark.gamma) * dt * a
-        a = np.linalg.solve(M + newmark.gamma_dt * C + newmark.beta_dt2 * K, load - C @ v - K @ u)
+        A = M + newmark.gamma_dt * C + newmark.beta_dt2 * K
+        a = np.asarray(np.linalg.solve(A, load - C @ v - K @ u), dtype=np.float64)
         u, v = u + newmark.beta_dt2 * a, v + newmark.gamma_dt * a
         if step % (steps // SAMPLES) == 0:
             found.append((middle @ u[: window.modes], u[-1]))

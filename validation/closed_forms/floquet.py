@@ -51,7 +51,7 @@ __all__ = ["Seats", "deflection_under_load", "free_rail", "jump", "load_transfer
 Complexes = NDArray[np.complex128]
 
 POINTS = 2**17  # of the inverse transform
-WAY = 80.0  # m: the load's distance in the inverse transform; a seat far from the load carries no force
+DISTANCE = 80.0  # m: the load's distance in the inverse transform; a seat far from the load carries no force
 DECAY = 0.06  # 1/m: eta / V; less than the decay of R over distance
 
 
@@ -120,7 +120,8 @@ def free_rail(beam: Beam, seats: Seats, omega: Complexes, phase: Complexes, x: f
 
 def _frequencies(V: float) -> Complexes:
     """Frequencies of the inverse transform, on a line below the real axis [rad/s]."""
-    return 2.0 * np.pi * np.fft.fftfreq(POINTS, WAY / (V * POINTS)) - 1j * DECAY * V
+    real = 2.0 * np.pi * np.fft.fftfreq(POINTS, DISTANCE / (V * POINTS))
+    return np.asarray(real - 1j * DECAY * V, dtype=np.complex128)
 
 
 def _seat_spectrum(beam: Beam, seats: Seats, V: float, P: float, omega: Complexes) -> Complexes:
@@ -144,8 +145,8 @@ def seat_force(beam: Beam, seats: Seats, V: float, P: float, x: Reals) -> Reals:
     """
     omega = _frequencies(V)
     spectrum = _seat_spectrum(beam, seats, V, P, omega) * (-1.0) ** np.arange(POINTS)  # t = 0 in the middle
-    way = (np.arange(POINTS) - POINTS // 2) * (WAY / POINTS)
-    history = (np.fft.ifft(spectrum) * (POINTS * V / WAY)).real * np.exp(DECAY * way)
+    way = (np.arange(POINTS) - POINTS // 2) * (DISTANCE / POINTS)
+    history = (np.fft.ifft(spectrum) * (POINTS * V / DISTANCE)).real * np.exp(DECAY * way)
     return np.interp(x, way, history)
 
 
@@ -166,11 +167,11 @@ def deflection_under_load(beam: Beam, seats: Seats, V: float, P: float, x: Reals
     alone = P / V * load_transfer(beam, omega / V, omega)
     R, lag = _seat_spectrum(beam, seats, V, P, omega), omega * seats.pitch / V
     # beyond the highest wave number of the sum only the kink of the shear strain remains
-    beyond = P / (np.pi * (beam.kGA - beam.m * V**2)) * WAY / (np.pi * POINTS)
+    beyond = P / (np.pi * (beam.kGA - beam.m * V**2)) * DISTANCE / (np.pi * POINTS)
     found = []
     for place in np.mod(x, seats.pitch):
         carried = R * free_rail(beam, seats, omega, lag, float(place)) * np.exp(1j * omega * place / V)
-        found.append(float(np.sum(alone - carried).real) * V / WAY + beyond)
+        found.append(float(np.sum(alone - carried).real) * V / DISTANCE + beyond)
     return np.array(found)
 
 

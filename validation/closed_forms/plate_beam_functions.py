@@ -38,7 +38,7 @@ def leissa_parameters(aspect: float, nu: float, count: int, functions: int = 6) 
     X, Y = _integrals(aspect, functions), _integrals(1.0, functions)
 
     def plate(i: int, j: int, k: int, l: int) -> Reals:
-        return np.kron(X[i][j], Y[k][l])
+        return np.asarray(np.kron(X[i][j], Y[k][l]), dtype=np.float64)
 
     cross = plate(2, 0, 0, 2)
     bending = plate(2, 2, 0, 0) + plate(0, 0, 2, 2) + nu * (cross + cross.T)

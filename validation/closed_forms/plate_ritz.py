@@ -44,7 +44,7 @@ def frequencies(
     Y = _integrals(width, degree)
 
     def plate(i: int, j: int, k: int, l: int) -> NDArray[np.float64]:
-        return np.kron(X[i][j], Y[k][l])
+        return np.asarray(np.kron(X[i][j], Y[k][l]), dtype=np.float64)
 
     cross = plate(2, 0, 0, 2)
     bending = plate(2, 2, 0, 0) + plate(0, 0, 2, 2) + nu * (cross + cross.T)

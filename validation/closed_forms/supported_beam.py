@@ -70,7 +70,7 @@ class Crossing:
 
     def wave_numbers(self, modes: int) -> Reals:
         """k_i [1/m], shape (modes,)."""
-        return np.arange(1, modes + 1) * np.pi / self.length
+        return np.arange(1.0, modes + 1) * np.pi / self.length
 
     def frequencies(self, modes: int) -> Reals:
         """omega_i [rad/s], shape (modes,)."""

@@ -103,7 +103,7 @@ def _blocks(writer: Writer, first: int) -> None:
 def _block(number: int) -> dict[str, Block]:
     count = SAMPLES[number]
     rng = np.random.default_rng(number)
-    time = np.arange(count) + 1000.0 * number
+    time = np.arange(0.0, count) + 1000.0 * number
     wheel = {name: rng.standard_normal((count, 2, 2)) for name in GROUPS["wheel"].channels}
     body = {"displacement": rng.standard_normal((count, 1, len(DOFS)))}
     return {"wheel": Block(time, time, wheel), "body": Block(time, time, body)}

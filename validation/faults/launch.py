@@ -162,7 +162,7 @@ def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str]) -> in
     os.dup2(file, 2)
     logging.disable()
     recorded(log)
-    worker.multiprocessing = _Copies()  # type: ignore[attr-defined]
+    worker.multiprocessing = _Copies()  # type: ignore[assignment,attr-defined]
     try:
         main(list(words), prog_name="tiengine", standalone_mode=True)
     except SystemExit as end:

@@ -72,7 +72,7 @@ def read(log: Path) -> Record:
     """Read the log of a run."""
     lines = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     commits = [line for line in lines if "rows" in line]
-    last = commits[-1] if commits else {"rows": {}, "samples": 0, "bytes": 0}
+    last: dict[str, Any] = commits[-1] if commits else {"rows": {}, "samples": 0, "bytes": 0}
     end = lines[-1] if lines else last
     lost = end["samples"] - last["samples"], end["bytes"] - last["bytes"]
     return Record(any(line["samples"] for line in lines), len(commits), last["rows"], *lost)

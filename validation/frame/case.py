@@ -101,8 +101,8 @@ def _judge(case: Case, reference: Reals, ours: Reals, seconds: float) -> Outcome
     met = bool(np.all(excess <= allowed))  # false for a NaN as well
     worst = int(np.argmax(np.where(np.isnan(margin), np.inf, margin)))
     if case.kind == "information":
-        texts = (", ".join(_number(x) for x in values) for values in (reference, ours))
-        return Outcome(case, "for information", *texts, seconds=seconds)
+        wanted, found = (", ".join(_number(x) for x in values) for values in (reference, ours))
+        return Outcome(case, "for information", wanted, found, seconds=seconds)
     bound = "" if case.rule == "within" else case.rule + " "
     return Outcome(
         case,

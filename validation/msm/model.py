@@ -254,8 +254,7 @@ def _slab_inverse(given: Ingredients, slab: ModalSlab, scale: Reals) -> Reals:
         w, slope = slab.seat[0, side], b * slab.seat[1, side]
         A[:m, :m] += vertical * ((w * scale[side]) @ w.T + (slope * scale[side]) @ slope.T)
         A[m:, m:] += lateral * ((across * scale[side]) @ across.T)
-    inverse: Reals = np.linalg.inv(A)
-    return inverse
+    return np.asarray(np.linalg.inv(A), dtype=np.float64)
 
 
 def _rail(r: Rail, L: float, modes: int) -> tuple[Reals, Reals]:

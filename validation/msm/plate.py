@@ -94,7 +94,7 @@ def modal_slab(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid], modes: i
     kept = min(modes, mesh.size)
     omega2, phi = scipy.linalg.eigh(K, M, subset_by_index=(0, kept - 1))
     omega2[:3] = 0.0  # rigid motions, up to rounding
-    x = (np.arange(slab.fastenings) + 0.5) * slab.fastening_pitch - slab.pitch / 2.0
+    x = (np.arange(0.0, slab.fastenings) + 0.5) * slab.fastening_pitch - slab.pitch / 2.0
     y = slab.seat_half_spacing
     at_seats = np.stack([_values(mesh, slab, x, side * y) for side in (-1.0, 1.0)], axis=1)  # (2, side, seats, n)
     lateral = _lateral_bed(slab, voids)

@@ -167,7 +167,7 @@ def _loop(
         if progress is not None:
             progress(done * dt, max(duration, done * dt))
     loop = time.perf_counter() - clock
-    return writer.close(
+    closed = writer.close(
         {
             "status": "complete",
             "simulated_time": done * dt,
@@ -177,6 +177,7 @@ def _loop(
             "real_time_factor": loop / (done * dt),
         }
     )
+    return Result.of(closed)
 
 
 def _samples(track: FullTrack, buffers: Buffers) -> Samples:
