@@ -138,7 +138,7 @@ def test_measuring_changes_no_bit():
     """The same steps with readings and without."""
     model = paper_model()
     watched, bare = (Run(model, V350, steps=20) for _ in range(2))
-    bare.march(20)
+    bare.advance(20)
     X = V350 * model.ingredients.newmark.dt * np.arange(1, 21)
     watched.stepper.load(X, np.full(20, V350), np.zeros(20), np.zeros_like(watched.chunk.irregularity))
     StageTimer(Times.of(watched.stepper), 10).take_timed(watched.stepper, [(i, i, i) for i in range(20)])

@@ -17,7 +17,7 @@ from tiengine.scenario.event_policy import Events
 from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.simulation import simulate
 
-from ..reference.marching import model_of
+from ..reference.stepping import model_of
 
 STEP = 2e-4
 

@@ -13,8 +13,7 @@ from tiengine import result as results
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.result import Result
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulation import simulate
-from tiengine.simulation import time_loop as march
+from tiengine.simulation import simulate, time_loop
 
 from ..models import V350
 
@@ -216,7 +215,7 @@ def test_rail_velocities_are_rates():
 
 def test_chunks_make_no_difference(result, monkeypatch):
     """The same bits in chunks of 137 steps as in one of 412."""
-    monkeypatch.setattr(march, "CHUNK_STEPS", 137)
+    monkeypatch.setattr(time_loop, "CHUNK_STEPS", 137)
     with result_of(gauges=[*GAUGES, FAR]) as other:
         for group in GROUPS:
             mine, theirs = result.group(group), other.group(group)
