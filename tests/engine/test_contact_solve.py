@@ -66,7 +66,7 @@ def test_forces_are_the_law_at_the_end_of_the_step(V: float, shift: float, kick:
     largest = np.abs(run.state.force[..., :3]).max()
     assert largest > 3e4
     assert kick > 1e-2 or run.state.iterations.max() < kernels.ITERATIONS
-    # tolerance 1e-6 of the wheel load a component; a pass takes the rest down by 10-20
+    # tolerance 1e-6 of the wheel load a component; a pass reduces the error by 10-20
     error = np.abs(law.local - run.state.force)[..., :3].max()
     share = 1e-4 if kick > 1e-2 else 1e-5  # thrown against the flange a wheelset is not still after six passes
     assert error < share * largest
@@ -76,7 +76,7 @@ def test_forces_are_the_law_at_the_end_of_the_step(V: float, shift: float, kick:
 
 @pytest.mark.parametrize(("V", "shift"), [(V350, 0.0), (V350, 8e-3), (20.0 / 3.6, 4e-3), (WALK, 0.0)])
 def test_three_passes_are_consistent(V: float, shift: float) -> None:
-    """What three passes leave is small beside the wheel load; it caught a miscompiled Newton loop."""
+    """The residual after three passes is small against the wheel load; this found a miscompiled Newton loop."""
     model = paper_model(V=V, dt=1e-4, passes=3)
     run = Run(model, V, X=101.0, steps=50)
     track = disturbed(run, 2, shift, 1e-3)

@@ -61,7 +61,7 @@ def test_public_launch_of_a_run():
 
 
 def in_a_process(threads: int, optimised: bool, steps: int) -> dict[str, Any]:
-    """What ``run_bits`` prints."""
+    """Output of ``run_bits``."""
     command = [sys.executable, str(PROGRAM), str(threads), str(int(optimised)), str(steps)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return json.loads(done.stdout.splitlines()[-1])

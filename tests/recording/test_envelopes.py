@@ -43,15 +43,15 @@ def test_envelopes_are_the_extremes_of_every_step(zone):
     stepper.watch("look", look)
     run.advance(1050)
     none = np.zeros(0)
-    passed, rest = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
+    passed, last = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
     assert len(passed.along) == state.first_seat > 25
-    np.testing.assert_array_equal(np.concatenate([passed.along, rest.along]), sorted(seen))
-    np.testing.assert_allclose(np.concatenate([passed.place, rest.place]), (np.array(sorted(seen)) + 0.5) * d)
+    np.testing.assert_array_equal(np.concatenate([passed.along, last.along]), sorted(seen))
+    np.testing.assert_allclose(np.concatenate([passed.place, last.place]), (np.array(sorted(seen)) + 0.5) * d)
     for extreme, reduce in (("largest", np.max), ("smallest", np.min)):
         for row, kind in enumerate(("vertical", "lateral")):
             name = f"{extreme}_{kind}_force"
             expected = [reduce([force[:, row] for force in seen[seat]], axis=0) for seat in sorted(seen)]
-            np.testing.assert_array_equal(np.concatenate([passed.channels[name], rest.channels[name]]), expected)
+            np.testing.assert_array_equal(np.concatenate([passed.channels[name], last.channels[name]]), expected)
 
 
 def test_after_one_step_the_seats_carry_the_train():
@@ -106,10 +106,10 @@ def test_slabs_against_their_coordinates(mortar):
     run.advance(500)
     stepper.finish(500)
     none = np.zeros(0)
-    passed, rest = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
+    passed, last = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
     assert len(passed.along) == run.state.first_slab > 0
-    numbers = np.concatenate([passed.along, rest.along])
-    found = {name: np.concatenate([passed.channels[name], rest.channels[name]]) for name in passed.channels}
+    numbers = np.concatenate([passed.along, last.along])
+    found = {name: np.concatenate([passed.channels[name], last.channels[name]]) for name in passed.channels}
     np.testing.assert_array_equal(numbers, sorted(seen))
     for i, name in enumerate(("deflection", "moment_x", "moment_y")):
         expected = [(max(row[i] for row in seen[k]), min(row[3 + i] for row in seen[k])) for k in sorted(seen)]

@@ -28,7 +28,7 @@ WHEEL_STEP, SHOT_STEP = 200, 250
 
 
 def chainage_of(step: int) -> float:
-    """Of the first vehicle's centre at the end of a step [m]."""
+    """Chainage of the first vehicle's centre at the end of a step [m]."""
     return START + V350 * DT * step
 
 
@@ -271,7 +271,7 @@ def test_files_open_in_xarray(tmp_path: Path):
 
 
 def test_a_train_that_fails_leaves_no_seats_that_it_never_passed(tmp_path: Path):
-    """What a derailed train does to the track in the end means nothing: seats in its window are left out."""
+    """Forces of a derailed train on the track mean nothing: seats in its window are left out."""
     path = tmp_path / "run.h5"
     wild = CASE | {"irregularity.scale": 100.0, "train.distance": 8.0}
     with pytest.raises(RunFailedError):

@@ -195,17 +195,17 @@ def test_forces_have_the_expected_size(file):
 
 
 def test_two_ways_of_reading_agree(file):
-    """``tiengine.open`` and the irregularity that the wheels felt."""
+    """``tiengine.open`` and the irregularity under the wheels."""
     import tiengine
     from tiengine.irregularity.irregularity import at_wheels, make_irregularity
 
     with tiengine.open(file) as result:
-        felt, wheel = result.irregularity(), result.wheel()
+        irregularity, wheel = result.irregularity(), result.wheel()
         scenario = result.scenario
         assert result.attributes["status"] == "complete"
-    assert set(felt) >= {"time", "vertical", "lateral"}
+    assert set(irregularity) >= {"time", "vertical", "lateral"}
     lead = 18.0 + float(wheel["wheelset_offset"].max())
     track = make_irregularity(scenario.irregularity, lead)
     rails = at_wheels(track.sample(wheel["position"][::100, None] + wheel["wheelset_offset"]))
-    np.testing.assert_allclose(felt["vertical"][::100], rails[..., 0], atol=1e-9)  # single precision of 5 mm
-    np.testing.assert_allclose(felt["lateral"][::100], rails[..., 1], atol=1e-9)
+    np.testing.assert_allclose(irregularity["vertical"][::100], rails[..., 0], atol=1e-9)  # single precision of 5 mm
+    np.testing.assert_allclose(irregularity["lateral"][::100], rails[..., 1], atol=1e-9)
