@@ -1,4 +1,4 @@
-"""What survives: a sample of ``python -m validation.faults``, and what it found, piece by piece."""
+"""Faults that a run survives: a sample of ``python -m validation.faults``, and its findings one by one."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def test_a_file_that_only_looks_like_a_journal_is_left_alone(tmp_path):
 
 
 def test_a_journal_of_another_file_never_meets_a_new_one(tmp_path):
-    """Of a file that was removed by hand after a crash; the new one would be cut to its length."""
+    """The journal of a file that was removed by hand after a crash: the new file would be cut to its length."""
     path = tmp_path / "run.h5"
     left_unfinished(path)
     journal_of(path).write_bytes(journal._journal(4096, [(0, bytearray(4096))]))

@@ -62,8 +62,8 @@ def assert_same(a: Path, b: Path) -> None:
 
 def stopped_after(chunks: int):
     """Asks to stop after so many questions, which come once a chunk."""
-    asked = count(1)
-    return lambda: next(asked) >= chunks
+    calls = count(1)
+    return lambda: next(calls) >= chunks
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,11 @@ def test_checkpoints_are_written_as_often_as_asked(tmp_path: Path):
         seen.extend(Checkpoint.read(path).facts["done"] for path in checkpoint_paths(tmp_path / "run.h5"))
 
     simulate.run(scenario(), tmp_path / "run.h5", progress=look, checkpoint=1e-9).close()
-    assert seen == [1000, 2000, 2000]  # asked before each chunk is saved, and with the rest of the envelopes at the end
+    assert seen == [
+        1000,
+        2000,
+        2000,
+    ]  # called before each chunk is saved, and with the remainder of the envelopes at the end
     assert checkpoint_paths(tmp_path / "run.h5") == []
 
 

@@ -15,8 +15,7 @@ from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recording.guards import LIMITS
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulation import simulate
-from tiengine.simulation import time_loop as march
+from tiengine.simulation import simulate, time_loop
 from validation.faults.contents import Contents, contents
 from validation.faults.plan import SEED
 from validation.faults.space import Check
@@ -111,7 +110,7 @@ def _growth(block: str, train: int, step: int) -> Change:
 @contextmanager
 def _spoiled(change: Change, block: str, train: int, crossed: list[float], dt: float) -> Iterator[None]:
     """Runs whose steps end with a change of the state, before the guard looks; notes when a limit is passed."""
-    begin = march.Run.begin
+    begin = time_loop.Run.begin
 
     def spoiled(*arguments: Any, **options: Any) -> Any:
         run = begin(*arguments, **options)
@@ -128,11 +127,11 @@ def _spoiled(change: Change, block: str, train: int, crossed: list[float], dt: f
         stepper.watch("faults", spoil, before="guards")
         return run
 
-    march.Run.begin = staticmethod(spoiled)  # type: ignore[method-assign,assignment]
+    time_loop.Run.begin = staticmethod(spoiled)  # type: ignore[method-assign,assignment]
     try:
         yield
     finally:
-        march.Run.begin = begin  # type: ignore[method-assign]
+        time_loop.Run.begin = begin  # type: ignore[method-assign]
 
 
 def _unstable(path: Path, checked: bool) -> Check:
