@@ -11,6 +11,7 @@ from tiengine.figures.palette import BLACK, SKY
 from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure
 from tiengine.indices.train_record import AbsentError, Train
 from tiengine.parameters.arrays import Reals
+from tiengine.parameters.sides import SIDES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +24,6 @@ __all__ = ["draw", "largest_by_stretch"]
 ROWS = 400  # a picture's, at most
 SLICE = 200  # snapshots in memory at a time
 COLOURS = "cividis"  # one ramp of lightness: reads in grey and for all eyes
-SIDES = ("left", "right")
 
 
 @in_style

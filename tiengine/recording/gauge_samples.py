@@ -21,6 +21,7 @@ from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 from tiengine.parameters.arrays import Reals
+from tiengine.parameters.sides import SIDES
 from tiengine.recording.seat_envelopes import watched_seats
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION
 from tiengine.result_files.layout import Block
@@ -30,7 +31,6 @@ from tiengine.track.plate_shapes import W, shapes_at
 __all__ = ["GaugeSamples", "gauge_samples"]
 
 ROWS = (at.U, at.V, at.A)
-SIDES = {"left": 0, "right": 1}
 
 
 class Place(Protocol):
@@ -213,10 +213,10 @@ def gauge_samples(gauge: Gauge, stepper: Stepper) -> GaugeSamples:
     trains = len(state.design)
     if gauge.on == "fastening":
         seat = nearest_seat(gauge.chainage, model.given.slab)
-        place: Place = SeatPlace(state, seat, SIDES[gauge.side or "left"], watched_seats(model))
+        place: Place = SeatPlace(state, seat, SIDES.index(gauge.side or "left"), watched_seats(model))
         return GaugeSamples(stepper, place, tuple(GAUGE_FORCE), np.empty((0, 2, trains)))
     if gauge.on == "rail":
-        place = RailPlace(model, state, gauge.chainage, SIDES[gauge.side or "left"])
+        place = RailPlace(model, state, gauge.chainage, SIDES.index(gauge.side or "left"))
     else:
         place = SlabPlace(model, state, gauge.chainage, gauge.y or 0.0)
     return GaugeSamples(stepper, place, tuple(GAUGE_MOTION), np.empty((0, 3, trains, 2)))

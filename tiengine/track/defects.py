@@ -15,12 +15,11 @@ from pydantic import Field
 
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
+from tiengine.parameters.sides import SIDES
 from tiengine.track.mortar import MortarVoid, bed_factors
 from tiengine.track.slab import Slab
 
 __all__ = ["FailedFastenings", "MortarDefect", "check_defects", "fastening_factors"]
-
-SIDES = {"left": (0,), "right": (1,), "both": (0, 1)}
 
 MOST_VOIDS = 100  # of one slab
 
@@ -69,8 +68,8 @@ def fastening_factors(failed: Iterable[FailedFastenings], first: int, count: int
     """
     factors = np.ones((count, 2))
     for row in failed:
-        for side in SIDES[row.rail]:
-            factors[max(row.seats[0] - first, 0) : max(row.seats[1] + 1 - first, 0), side] *= row.factor
+        sides = slice(None) if row.rail == "both" else SIDES.index(row.rail)
+        factors[max(row.seats[0] - first, 0) : max(row.seats[1] + 1 - first, 0), sides] *= row.factor
     return factors
 
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 from pydantic import model_validator
 
 from tiengine.parameters.quantity import Name, Params, Q, Source
+from tiengine.parameters.sides import SIDES, SIGNS
 from tiengine.vehicle.connector import (
     Body,
     Damper,
@@ -32,7 +33,7 @@ __all__ = ["Coach", "expand"]
 _Span = Annotated[float, Q("m", gt=0)]
 _Height = Annotated[float, Q("m", "above the rail", gt=0)]
 _Rates = tuple[Annotated[float, Q("m/s", ge=0)], ...]
-_SIDES = ((-1.0, "left"), (1.0, "right"))
+_SIDES = tuple(zip(SIGNS, SIDES, strict=True))
 
 
 class Geometry(Params):
