@@ -47,6 +47,17 @@ class SlabDesigns:
     of_slab: Mapping[int, int]
 
 
+def slot_count(length: float, pitch: float, cover: bool) -> int:
+    """Slots for the slabs of a window: Eq. (16) of the paper, or one more, since a moving window can touch that many.
+
+    Args:
+        length: Window [m].
+        pitch: Distance of the slabs [m].
+        cover: Whether every seat of the window must have its slab.
+    """
+    return int(np.floor(length / pitch)) + (2 if cover else 1)
+
+
 @dataclass(frozen=True)
 class Ingredients:
     """What a model is made from.
@@ -95,8 +106,8 @@ class Ingredients:
 
     @property
     def slots(self) -> int:
-        """Slabs in memory: the paper's Eq. (16), or one more, since a moving window can touch that many."""
-        return int(np.floor(self.length / self.slab.pitch)) + (2 if self.cover else 1)
+        """Slots for the slabs of the window."""
+        return slot_count(self.length, self.slab.pitch, self.cover)
 
 
 @dataclass(frozen=True, eq=False)
