@@ -45,7 +45,7 @@ def test_envelopes_are_the_extremes_of_every_step(zone):
     passed, rest = envelopes.blocks(none, none)[0], envelopes.rest()[0]
     assert len(passed.along) == state.first_seat > 25
     np.testing.assert_array_equal(np.concatenate([passed.along, rest.along]), sorted(seen))
-    np.testing.assert_allclose(np.concatenate([passed.place, rest.place]), (np.array(sorted(seen)) + 0.5) * d)
+    np.testing.assert_allclose(np.concatenate([passed.chainage, rest.chainage]), (np.array(sorted(seen)) + 0.5) * d)
     for extreme, reduce in (("largest", np.max), ("smallest", np.min)):
         for row, kind in enumerate(("vertical", "lateral")):
             name = f"{extreme}_{kind}_force"

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tiengine.engine.stepper import Chunk
 from tiengine.kernels import layout as at
 from tiengine.result_files.channels import MORTAR
-from tiengine.result_files.layout import DTYPES
-from tiengine.result_files.writer import Block, GroupSpec, TrainLabels, Writer
+from tiengine.result_files.layout import DTYPES, Block, GroupSpec, TrainLabels
+from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario
 from tiengine.vehicle.train import TrainModel
 
