@@ -1,4 +1,4 @@
-"""Result files as nobody means them: cut, changed, forged, foreign; each command answers in one line."""
+"""Damaged, forged and foreign result files: every command reads them correctly or refuses them in one line."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def contents(whole: Path) -> dict[str, Any]:
 
 
 def everything(path: Path) -> dict[str, Any]:
-    """All that a file holds, by path; texts apart, which HDF5 keeps without a checksum."""
+    """Contents of a file by path, without strings, for which HDF5 has no checksum."""
     with tiengine.open(path) as result:
         found: dict[str, Any] = {"scenario": result.scenario_toml, "trains": result.trains}
         node = result["trains/000"]
@@ -243,7 +243,7 @@ def foreign(kind: str, path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["text", "empty", "signature", "HDF5", "old", "new", "odd", "words"])
 def test_foreign_files(kind: str, tmp_path: Path) -> None:
-    """What it is not, or which version it is and what to do."""
+    """The message states the kind of file, or its version and what to do."""
     path = tmp_path / "foreign.h5"
     foreign(kind, path)
     for command in (*COMMANDS, ("resume",)):
@@ -251,18 +251,18 @@ def test_foreign_files(kind: str, tmp_path: Path) -> None:
     message = refused(lambda: tiengine.open(path))
     assert message is not None
     other_version = kind in ("old", "new", "odd", "words")
-    assert ("tiengine that wrote it (9.8), or run its scenario anew" in message) == other_version
+    assert ("tiengine that wrote it (9.8), or run its scenario again" in message) == other_version
     assert ("not a tiengine result" in message) != other_version
 
 
 def test_a_file_in_a_file_is_not_followed(whole: Path, tmp_path: Path) -> None:
-    """Links to other files and data kept in them are named, whoever they belong to."""
+    """Links to other files and externally stored data are refused by name."""
     path = tmp_path / "linked.h5"
     for kind, words in (
-        ("external link", "leads to another place or file"),
-        ("soft link", "leads to another place or file"),
-        ("external data", "lies in another file"),
-        ("1e15 samples", "claims 4e+09 MB of samples, the file holds 0 MB"),
+        ("external link", "is a link to another place or file"),
+        ("soft link", "is a link to another place or file"),
+        ("external data", "stored in another file"),
+        ("1e15 samples", "declares 4e+09 MB of samples, the file holds 0 MB"),
     ):
         path.write_bytes(whole.read_bytes())
         forge(path, (kind, "trains/000/wheel/vertical_force", "", None))
@@ -280,4 +280,4 @@ def test_a_changed_scenario_is_found_out(whole: Path, tmp_path: Path) -> None:
     assert data.count(b"friction = 0.3") == 1
     path.write_bytes(data.replace(b"friction = 0.3", b"friction = 0.4"))
     with tiengine.open(path) as result:
-        assert refused(lambda: result.scenario_toml) == f"{path}: scenario: damaged: its checksum is another one"
+        assert refused(lambda: result.scenario_toml) == f"{path}: scenario: damaged: its checksum does not match"

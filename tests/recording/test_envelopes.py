@@ -46,7 +46,7 @@ def test_envelopes_are_the_extremes_of_every_step(zone):
     passed, last = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
     assert len(passed.along) == state.first_seat > 25
     np.testing.assert_array_equal(np.concatenate([passed.along, last.along]), sorted(seen))
-    np.testing.assert_allclose(np.concatenate([passed.place, last.place]), (np.array(sorted(seen)) + 0.5) * d)
+    np.testing.assert_allclose(np.concatenate([passed.chainage, last.chainage]), (np.array(sorted(seen)) + 0.5) * d)
     for extreme, reduce in (("largest", np.max), ("smallest", np.min)):
         for row, kind in enumerate(("vertical", "lateral")):
             name = f"{extreme}_{kind}_force"

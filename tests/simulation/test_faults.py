@@ -20,7 +20,7 @@ from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.result_files import journal
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
 from tiengine.result_files.events import Event
-from tiengine.result_files.file_lock import locked, release
+from tiengine.result_files.file_lock import acquire_lock, release_lock
 from tiengine.result_files.journal import atomic_write, journal_of
 from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
 from tiengine.result_files.writer import Writer
@@ -213,10 +213,10 @@ def test_a_reader_does_not_wait_for_a_writer_for_ever(tmp_path, monkeypatch):
     path = tmp_path / "run.h5"
     left_unfinished(path)
     atomic_write(journal_of(path), journal._journal(path.stat().st_size, []))
-    lock = locked(path)
+    lock = acquire_lock(path)
     with results.open(path) as result:
         assert not result.finished
-    release(lock)
+    release_lock(lock)
     assert journal_of(path).exists()
 
 
@@ -236,7 +236,7 @@ def test_a_full_disk_is_one_sentence_and_keeps_what_was_committed(tmp_path, monk
         if doing == "add":
             writer.add(1, LABELS, {"status": "running"})
         elif doing == "note":
-            writer.note(0, [Event("wheel_lift", 0.1, 1.0, 1, "left", "x" * 100_000, False)])
+            writer.add_events(0, [Event("wheel_lift", 0.1, 1.0, 1, "left", "x" * 100_000, False)])
         elif doing == "write":
             write(writer, 600, 5000)
         else:
@@ -296,7 +296,7 @@ def test_a_signal_may_come_in_the_middle_of_printing(capfd):
     with cli_run._stopped_by_signals(Busy()) as stop:
         os.kill(os.getpid(), signal.SIGTERM)
         assert stop.number == signal.SIGTERM
-    assert "once more to leave at once" in capfd.readouterr().err
+    assert "a second signal exits at once" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,7 @@ def test_an_ensemble_goes_on_with_other_workers(tmp_path: Path):
 
 
 def test_only_an_unfinished_result_is_resumed(whole: Path, tmp_path: Path):
-    with pytest.raises(InputError, match="is complete; there is nothing to resume"):
+    with pytest.raises(InputError, match="the run is complete; there is nothing to resume"):
         simulate.resume(whole)
     with pytest.raises(InputError, match="no such file"):
         simulate.resume(tmp_path / "none.h5")
@@ -140,7 +140,7 @@ def test_an_unfinished_result_is_not_replaced_by_accident(tmp_path: Path):
     path = tmp_path / "run.h5"
     with pytest.raises(RunStoppedError):
         simulate.run(scenario(), path, stop=stopped_after(1))
-    with pytest.raises(InputError, match="it is an unfinished run: continue it by `tiengine resume"):
+    with pytest.raises(InputError, match="it is an unfinished run: resume it with `tiengine resume"):
         simulate.run(scenario(), path)
 
 

@@ -204,7 +204,7 @@ class Collector:
 
     def _note(self, events: Mapping[int, Sequence[Event]]) -> None:
         for train, found in events.items():
-            self._writer.note(train, found)
+            self._writer.add_events(train, found)
             of = f"train {train}: " if len(self._facts) > 1 else ""
             for event in found:
                 self.notify(f"{of}{event}")

@@ -249,5 +249,5 @@ def _until(blocks: dict[str, Block], time: float) -> dict[str, Block]:
     for name, block in blocks.items():
         count = int(np.searchsorted(block.along, time * (1.0 + 1e-12), side="right"))
         channels = {channel: values[:count] for channel, values in block.channels.items()}
-        kept[name] = Block(block.along[:count], block.place[:count], channels)
+        kept[name] = Block(block.along[:count], block.chainage[:count], channels)
     return kept
