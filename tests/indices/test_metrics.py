@@ -65,7 +65,7 @@ def write(path: Path | None = None, *, duration: float = 12.0, interval: float =
                 writer.append(train, "body", time, SPEED * time, {"acceleration": body})
             last = train == trains - 1
             writer.describe(train, {"status": change.get("status", "complete") if last else "complete"})
-        return writer.close({"status": "complete"})
+        return results.Result.of(writer.close({"status": "complete"}))
 
 
 def values(result: results.Result) -> dict[tuple[str, str], object]:
@@ -116,7 +116,7 @@ def test_vehicles_are_kept_apart():
     with Writer(None, to_toml(coaches), {}, [labels], groups) as writer:
         writer.append(0, "wheel", time, SPEED * time, dict(zip(names, (0.0 * force, force), strict=True)))
         writer.append(0, "body", time, SPEED * time, {"acceleration": body})
-        with writer.close({"status": "complete"}) as result:
+        with results.Result.of(writer.close({"status": "complete"})) as result:
             indices = result.metrics().trains[0].indices
     sperling = [index.value for index in indices if index.name == "Sperling index W, vertical"]
     assert sperling == pytest.approx([0.0, 2.59148, 0.0], abs=1e-5)

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from tiengine import result as results
 from tiengine.cli.commands import main
 from tiengine.figures.catalogue import KINDS
 from tiengine.indices.key_figures import KeyFigure, key_figures, summarise
 from tiengine.indices.train_record import Train
 from tiengine.report.page import render
 from tiengine.report.scenario_words import scenario_words
+from tiengine.result_files.reader import RUNNING
 from tiengine.scenario.scenario import load_scenario
 
 from .. import hand_made as by
@@ -55,7 +55,7 @@ def file(tmp_path, monkeypatch) -> Path:
 @pytest.fixture
 def few_figures(monkeypatch):
     """One figure only, where a report's words are looked at."""
-    monkeypatch.setattr("tiengine.report.KINDS", [kind for kind in KINDS if kind.name in ("contact", "waterfall")])
+    monkeypatch.setattr("tiengine.report.page.KINDS", [kind for kind in KINDS if kind.name in ("contact", "waterfall")])
 
 
 def assert_refused(result: Result, message: str) -> None:
@@ -254,5 +254,5 @@ def test_listing_does_not_import_matplotlib():
 
 def test_unfinished_files_are_drawn(tmp_path, few_figures):
     """A run on its way: what is there so far, and a word about it."""
-    with by.made(tmp_path / "a.h5", by.scenario(), groups(300), status=results.RUNNING) as result:
+    with by.made(tmp_path / "a.h5", by.scenario(), groups(300), status=RUNNING) as result:
         assert "The run did not come to its end: running" in render(result)
