@@ -210,7 +210,7 @@ def test_a_short_run_has_no_long_indices():
         ({"body": False}, "no body/acceleration; the indices need it: name it in output.body_channels"),
         ({"duration": 0.55}, "m are too short: output.run_in = 50 must leave 10 m"),
         ({"interval": 6e-3}, "output.wheel_interval = 0.006: too coarse for the filters, must be at most 0.005 s"),
-        ({"status": "derailed"}, "no train has run to its end: derailed"),
+        ({"status": "derailed"}, "no train completed its run: derailed"),
     ],
 )
 def test_what_cannot_be_evaluated_is_refused(change, message):
@@ -243,7 +243,7 @@ def test_command(tmp_path):
     file, out = str(tmp_path / "run.h5"), tmp_path / "run.json"
     done = CliRunner().invoke(main, ["metrics", file, "--json", str(out)])
     assert done.exit_code == 0, done.output
-    for text in ("EN 14363:2016", "within", "7.5.2 running safety", "indices, not an assessment: way is only"):
+    for text in ("EN 14363:2016", "within", "7.5.2 running safety", "indices, not an assessment: the run covers only"):
         assert text in done.stdout
     tables = json.loads(out.read_text(encoding="utf-8"))
     first = tables["trains"][0]["indices"][0]

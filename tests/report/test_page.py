@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import base64
 import re
-import subprocess
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -201,7 +199,7 @@ def test_names_in_a_file_are_only_text(tmp_path, few_figures):
     assert "script" not in page.texts
     assert EVIL in page.texts["h1"]
     assert "<script src=" in page.texts["pre"][0]
-    assert any(f"did not come to its end: {EVIL}" in words for words in page.texts["p"])
+    assert any(f"The run is not complete: {EVIL}" in words for words in page.texts["p"])
     assert sum(EVIL in words for words in page.texts["td"]) >= 3  # source, failure, event
     assert any(words.startswith("No indices: ") for words in page.texts["p"])
 
@@ -246,13 +244,7 @@ def test_a_scenario_in_words():
     assert smooth["Trains"] == "3 realisations of the irregularity, train.speed_kmh in 3 values"
 
 
-def test_listing_does_not_import_matplotlib():
-    """The commands' names come without what they need: listing answers at once."""
-    code = "import sys, tiengine.cli; sys.exit('matplotlib' in sys.modules or 'jinja2' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
 def test_unfinished_files_are_drawn(tmp_path, few_figures):
     """A run on its way: what is there so far, and a word about it."""
     with by.made(tmp_path / "a.h5", by.scenario(), groups(300), status=RUNNING) as result:
-        assert "The run did not come to its end: running" in render(result)
+        assert "The run is not complete: running" in render(result)
