@@ -6,9 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
+
+from tiengine.result_files.channels import WHEEL
+from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
+from tiengine.scenario.scenario import to_toml
 
 from .. import hand_made as by
 
@@ -48,7 +51,7 @@ def loaded(code: str, *arguments: str, folder: Path | None = None) -> set[str]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder that holds ``run.h5``, a result with the channels that figures and indices read."""
+    """Holds ``run.h5``, with the channels that figures and indices read, and ``short.h5`` as the program writes it."""
     path = tmp_path_factory.mktemp("results")
     noise = np.random.default_rng(0).standard_normal
     Q, Y = 70e3 + 1e3 * noise((SAMPLES, 4, 2)), 1e3 * noise((SAMPLES, 4, 2))
@@ -59,15 +62,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "seats": by.seats(600),
         "slabs": by.slabs(70),
     }
-    with h5py.File(by.written(path / "run.h5", by.scenario(), groups), "a") as file:
-        file["trains/000/wheel/vertical_force"].attrs["coordinates"] = "time position"  # export tells channels by it
+    by.written(path / "run.h5", by.scenario(), groups)
+    labels = TrainLabels(["coach"], by.BODIES, np.zeros(4, np.int64), by.OFFSET)
+    standard = {"wheel": GroupSpec.standard("wheel", tuple(WHEEL))}
+    with Writer(path / "short.h5", to_toml(by.scenario()), {}, [labels], standard) as writer:
+        time = 1e-3 * np.arange(10)
+        writer.append(0, "wheel", time, by.V * time, {name: np.zeros((10, 4, 2)) for name in WHEEL})
+        writer.close({"status": "complete"}).close()
     return path
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        "list", "info run.h5", "metrics run.h5", "plot run.h5", "report run.h5", "export run.h5 -o run.csv --channel wheel/vertical_force",
+        "list", "info run.h5", "metrics run.h5", "plot run.h5", "report run.h5", "export short.h5 -o short.csv",
         "contact LMA CHN60", "contact LMA CHN60 -o contact.png", "run --help",
     ],
 )  # fmt: skip

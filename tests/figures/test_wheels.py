@@ -68,7 +68,7 @@ def test_bands_take_several_values_a_place():
 
 
 def test_forces_are_those_of_the_file(tmp_path):
-    """Low pass and means of the indices; the bands reach as far as any wheel; chainage is the wheelset's own."""
+    """Low pass and means equal those of the indices; bands span all wheels; the chainage is that of the wheelset."""
     Q, Y = noise(1000)
     with by.made(tmp_path / "a.h5", by.scenario(), {"wheel": by.wheel(Q, Y)}) as result:
         figure = forces.draw(result)
@@ -106,7 +106,7 @@ def test_forces_beyond_the_limits_stay_in_the_picture(tmp_path):
 
 
 def test_slices_are_filtered_as_one(tmp_path):
-    """A run of two and a half slices, seam by seam: what the filter forgets over ten periods is below 1e-12."""
+    """Two and a half slices equal one piece: after ten periods the filter's response is below 1e-12."""
     force = rng.standard_normal((5 * SLICE // 2, 4, 2))
     with by.made(tmp_path / "a.h5", by.scenario(), {"wheel": by.wheel(force, force, 2e-4)}) as result:
         samples = Train(result).samples("wheel", "vertical_force")

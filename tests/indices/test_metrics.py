@@ -166,7 +166,7 @@ def test_run_in_is_left_out():
      (YAW, "lateral", HALF_BOGIE_CENTRES)],
 )  # fmt: skip
 def test_floor_points_move_with_the_car(dof, direction, arm):
-    """1 Hz, so that 0.5 m/s^2 over the bogie have Sperling indices 2.59148 and 2.83575; the car's rest is still."""
+    """A sine of 0.5 m/s^2 at 1 Hz over the bogie has Sperling indices 2.59148 and 2.83575."""
     got = values(write(car=acceleration(dof, 0.5 / arm, 1.0)))
     expected = {"vertical": 2.59148, "lateral": 2.83575}[direction]
     assert got["GB/T", f"Sperling index W, {direction}"].value == pytest.approx(expected, abs=1e-5)

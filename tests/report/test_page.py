@@ -63,7 +63,7 @@ def assert_refused(result: Result, message: str) -> None:
 
 
 def test_plot_draws_what_the_file_gives(file):
-    """Seven kinds asked for, five drawn; the rest with the key to set."""
+    """Kinds that the file has the data for are drawn; the others name the key to set."""
     result = call("plot", file)
     assert result.exit_code == 0, result.output
     lines = dict(line.split(maxsplit=1) for line in result.stdout.splitlines())
@@ -119,7 +119,7 @@ def test_plot_refuses(file, arguments, message):
 
 
 def test_report_refuses(file):
-    """A page is no place for a result."""
+    """The page never replaces a result."""
     assert_refused(call("report", file, "-o", "run.h5"), "its suffix must be .html or .htm")
     assert_refused(call("report", file, "-o", "no/such/page.html"), "there is no folder")
     assert_refused(call("report", file, "--train", "7"), "must be from 0 to 0")
@@ -217,7 +217,7 @@ def test_report_of_many_trains(tmp_path, few_figures):
 
 
 def test_key_figures_of_a_poor_file(tmp_path, few_figures):
-    """What is not there is left out."""
+    """Key figures whose data the file lacks are left out."""
     with by.made(tmp_path / "a.h5", by.scenario(), {"body": by.body(np.zeros((300, 7, 5)))}) as result:
         assert key_figures(Train(result)) == []
         assert "The file holds neither wheel forces nor envelopes" in render(result)
@@ -245,6 +245,6 @@ def test_a_scenario_in_words():
 
 
 def test_unfinished_files_are_drawn(tmp_path, few_figures):
-    """A run on its way: what is there so far, and a word about it."""
+    """An unfinished run: its results so far, with a notice."""
     with by.made(tmp_path / "a.h5", by.scenario(), groups(300), status=RUNNING) as result:
         assert "The run is not complete: running" in render(result)
