@@ -1,17 +1,20 @@
-"""Public class of a result file: reader, scenario, indices and xarray datasets."""
+"""Public class of a result file: reader, scenario, indices and xarray datasets.
+
+Scenarios, indices and xarray are imported when first used: opening a file needs none of them.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tiengine.indices.metrics import Metrics, evaluate
 from tiengine.result_files.reader import Reader, open_file
-from tiengine.scenario.recorded import recorded_scenario
-from tiengine.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     import xarray
+
+    from tiengine.indices.metrics import Metrics
+    from tiengine.scenario.scenario import Scenario
 
 __all__ = ["Result", "open"]
 
@@ -31,6 +34,8 @@ class Result(Reader):
     @property
     def scenario(self) -> Scenario:
         """Scenario that was run."""
+        from tiengine.scenario.recorded import recorded_scenario
+
         return recorded_scenario(self)
 
     def scenario_of(self, train: int) -> Scenario:
@@ -52,10 +57,7 @@ class Result(Reader):
         Raises:
             InputError: There is no such train or group, the trains cannot be stacked, or xarray is missing.
         """
-        from tiengine.result_files.xarray_datasets import (  # xarray takes a second to import
-            open_dataset,
-            stacked_dataset,
-        )
+        from tiengine.result_files.xarray_datasets import open_dataset, stacked_dataset
 
         if train is None:
             return stacked_dataset(self, self.file, group)
@@ -70,6 +72,8 @@ class Result(Reader):
         Raises:
             InputError: There is no such train, or the file lacks channels that the indices need.
         """
+        from tiengine.indices.metrics import evaluate
+
         return evaluate(self, train)
 
 
