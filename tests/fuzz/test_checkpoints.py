@@ -1,4 +1,4 @@
-"""Damaged and forged checkpoints are refused."""
+"""Damaged and forged checkpoints: cut, changed, with false facts, with false sizes."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def same(found: Checkpoint) -> bool:
 
 @EXAMPLES
 def test_changed_bytes(examples: int, tmp_path: Path) -> None:
-    """Refused, or the same facts and bits: every byte that counts is under a checksum."""
+    """A changed checkpoint is refused, or has the same facts and bits: every relevant byte is under a checksum."""
     path = checkpoint(tmp_path)
     content = path.read_bytes()
 
@@ -71,7 +71,7 @@ def test_changed_bytes(examples: int, tmp_path: Path) -> None:
 
 @EXAMPLES
 def test_forged_facts(examples: int, tmp_path: Path) -> None:
-    """Facts that are not JSON, or impossible values, in an intact archive."""
+    """Facts that are no JSON or have impossible values, in an undamaged archive, are refused."""
     path = checkpoint(tmp_path)
     good = json.dumps({"version": 1, "made_by": {}, "task": 0, **FACTS})
     odd = st.dictionaries(
@@ -103,7 +103,7 @@ def test_forged_facts(examples: int, tmp_path: Path) -> None:
 
 
 def npy(shape: str, dtype: str = "'<f8'", order: str = "False") -> bytes:
-    """Array file with a freely chosen header."""
+    """Array file with an arbitrary header."""
     header = f"{{'descr': {dtype}, 'fortran_order': {order}, 'shape': {shape}, }}".encode().ljust(117) + b"\n"
     return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(64)
 
@@ -124,7 +124,7 @@ def npy(shape: str, dtype: str = "'<f8'", order: str = "False") -> bytes:
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_forged_arrays(header: bytes, why: str, tmp_path: Path) -> None:
-    """The size declared by the header of an array is compared with the bytes of the file."""
+    """An array's header is accepted only if the file has the bytes for it."""
     path = tmp_path / ".run.h5.0000.checkpoint"
     forged = io.BytesIO()
     with zipfile.ZipFile(forged, "w") as archive:
@@ -136,7 +136,7 @@ def test_forged_arrays(header: bytes, why: str, tmp_path: Path) -> None:
 
 
 def test_archive_bombs(tmp_path: Path) -> None:
-    """Compressed members are not unpacked; sizes in the directory of the archive are compared with the file's size."""
+    """Compressed members are not unpacked; sizes in the archive's directory are compared with the file's size."""
     path = tmp_path / ".run.h5.0000.checkpoint"
     bomb = io.BytesIO()
     with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -157,7 +157,7 @@ def test_archive_bombs(tmp_path: Path) -> None:
 
 
 def test_a_damaged_checkpoint_says_what_to_do(tmp_path: Path) -> None:
-    """The run can continue without it."""
+    """The run can be resumed without the damaged checkpoint."""
     path = checkpoint(tmp_path)
     path.write_bytes(path.read_bytes()[:-30])
     with pytest.raises(InputError, match=r"0000\.checkpoint: not a checkpoint, or damaged .*; remove it to run"):
