@@ -78,7 +78,7 @@ def answered(path: Path, command: tuple[str, ...]) -> bool:
 
 @EXAMPLES
 def test_changed_bytes(examples: int, whole: Path, contents: dict[str, Any], tmp_path: Path) -> None:
-    """A changed file is refused or has all numbers and the scenario unchanged; each has its own name, as HDF5 caches files."""
+    """A changed file is refused or has all numbers and the scenario unchanged; HDF5 caches files, hence a name for each."""
     content, count = whole.read_bytes(), itertools.count()
 
     def check(damage: Damage) -> bool:

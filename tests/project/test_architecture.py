@@ -19,7 +19,7 @@ WINGS = (
 
 
 def imported(source: str) -> set[str]:
-    """Modules of the package that a source text imports, for example ``contact.table``, including type-only and lazy imports."""
+    """Modules of the package that a text imports, for example ``contact.table``; type-only and lazy imports too."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "tiengine":

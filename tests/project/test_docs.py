@@ -89,7 +89,7 @@ def test_every_key_is_described():
 
 
 def test_reference_knows_unit_range_and_default():
-    """Rows written by hand from the declarations: a bound, a number or a word, a list, a nested table, a required part."""
+    """Rows written by hand from the declarations: bound, number or word, list, nested table, required part."""
     text = page()
     for row in (
         "| `distance` | number | m | > 0, ≤ 1e6 | required | distance the train covers |",
