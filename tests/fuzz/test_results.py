@@ -19,7 +19,7 @@ from tiengine.parameters.errors import RunStoppedError
 from tiengine.result_files.reader import RUNNING
 from tiengine.result_files.writer import Writer
 from tiengine.simulation import simulate
-from tiengine.simulation.collector import Gathering
+from tiengine.simulation.collector import Collector
 from tiengine.simulation.tasks import Task
 
 from ..fuzzing import DAMAGES, EXAMPLES, Damage, deadline, on_many, refused
@@ -200,7 +200,7 @@ def test_forged_structure_resumed(
 ) -> None:
     """``tiengine resume`` refuses before it computes; the file remains unchanged."""
 
-    def stop(self: object, writer: Writer, gathering: Gathering, tasks: list[Task]) -> None:
+    def stop(self: object, writer: Writer, collector: Collector, tasks: list[Task]) -> None:
         for train in writer.facts():
             writer.rewind(train, {})
         raise RunStoppedError("here")
@@ -251,7 +251,7 @@ def test_foreign_files(kind: str, tmp_path: Path) -> None:
     message = refused(lambda: tiengine.open(path))
     assert message is not None
     other_version = kind in ("old", "new", "odd", "words")
-    assert ("tiengine that wrote it (9.8), or run its scenario anew" in message) == other_version
+    assert ("tiengine that wrote it (9.8), or run its scenario again" in message) == other_version
     assert ("not a tiengine result" in message) != other_version
 
 
@@ -259,10 +259,10 @@ def test_a_file_in_a_file_is_not_followed(whole: Path, tmp_path: Path) -> None:
     """Links to other files and data kept in them are named."""
     path = tmp_path / "linked.h5"
     for kind, words in (
-        ("external link", "leads to another place or file"),
-        ("soft link", "leads to another place or file"),
-        ("external data", "lies in another file"),
-        ("1e15 samples", "claims 4e+09 MB of samples, the file holds 0 MB"),
+        ("external link", "is a link to another place or file"),
+        ("soft link", "is a link to another place or file"),
+        ("external data", "stored in another file"),
+        ("1e15 samples", "declares 4e+09 MB of samples, the file holds 0 MB"),
     ):
         path.write_bytes(whole.read_bytes())
         forge(path, (kind, "trains/000/wheel/vertical_force", "", None))
@@ -280,4 +280,4 @@ def test_a_changed_scenario_is_found_out(whole: Path, tmp_path: Path) -> None:
     assert data.count(b"friction = 0.3") == 1
     path.write_bytes(data.replace(b"friction = 0.3", b"friction = 0.4"))
     with tiengine.open(path) as result:
-        assert refused(lambda: result.scenario_toml) == f"{path}: scenario: damaged: its checksum is another one"
+        assert refused(lambda: result.scenario_toml) == f"{path}: scenario: damaged: its checksum does not match"

@@ -18,7 +18,8 @@ from tiengine.indices.ride import Ride
 from tiengine.parameters.errors import InputError
 from tiengine.report.metrics_table import metrics_table
 from tiengine.result_files.channels import WHEEL
-from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
+from tiengine.result_files.layout import GroupSpec, TrainLabels
+from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.vehicle.train import assemble, static_wheel_loads
 
@@ -65,7 +66,7 @@ def write(path: Path | None = None, *, duration: float = 12.0, interval: float =
                 writer.append(train, "body", time, SPEED * time, {"acceleration": body})
             last = train == trains - 1
             writer.describe(train, {"status": change.get("status", "complete") if last else "complete"})
-        return writer.close({"status": "complete"})
+        return results.Result.of(writer.close({"status": "complete"}))
 
 
 def values(result: results.Result) -> dict[tuple[str, str], object]:
@@ -116,7 +117,7 @@ def test_vehicles_are_kept_apart():
     with Writer(None, to_toml(coaches), {}, [labels], groups) as writer:
         writer.append(0, "wheel", time, SPEED * time, dict(zip(names, (0.0 * force, force), strict=True)))
         writer.append(0, "body", time, SPEED * time, {"acceleration": body})
-        with writer.close({"status": "complete"}) as result:
+        with results.Result.of(writer.close({"status": "complete"})) as result:
             indices = result.metrics().trains[0].indices
     sperling = [index.value for index in indices if index.name == "Sperling index W, vertical"]
     assert sperling == pytest.approx([0.0, 2.59148, 0.0], abs=1e-5)
@@ -166,7 +167,7 @@ def test_run_in_is_left_out():
      (YAW, "lateral", HALF_BOGIE_CENTRES)],
 )  # fmt: skip
 def test_floor_points_move_with_the_car(dof, direction, arm):
-    """1 Hz, so that 0.5 m/s^2 over the bogie have Sperling indices 2.59148 and 2.83575; the car's rest is still."""
+    """A sine of 0.5 m/s^2 at 1 Hz over the bogie has Sperling indices 2.59148 and 2.83575."""
     got = values(write(car=acceleration(dof, 0.5 / arm, 1.0)))
     expected = {"vertical": 2.59148, "lateral": 2.83575}[direction]
     assert got["GB/T", f"Sperling index W, {direction}"].value == pytest.approx(expected, abs=1e-5)
@@ -210,7 +211,7 @@ def test_a_short_run_has_no_long_indices():
         ({"body": False}, "no body/acceleration; the indices need it: name it in output.body_channels"),
         ({"duration": 0.55}, "m are too short: output.run_in = 50 must leave 10 m"),
         ({"interval": 6e-3}, "output.wheel_interval = 0.006: too coarse for the filters, must be at most 0.005 s"),
-        ({"status": "derailed"}, "no train has run to its end: derailed"),
+        ({"status": "derailed"}, "no train completed its run: derailed"),
     ],
 )
 def test_what_cannot_be_evaluated_is_refused(change, message):
@@ -243,7 +244,7 @@ def test_command(tmp_path):
     file, out = str(tmp_path / "run.h5"), tmp_path / "run.json"
     done = CliRunner().invoke(main, ["metrics", file, "--json", str(out)])
     assert done.exit_code == 0, done.output
-    for text in ("EN 14363:2016", "within", "7.5.2 running safety", "indices, not an assessment: way is only"):
+    for text in ("EN 14363:2016", "within", "7.5.2 running safety", "indices, not an assessment: the run covers only"):
         assert text in done.stdout
     tables = json.loads(out.read_text(encoding="utf-8"))
     first = tables["trains"][0]["indices"][0]

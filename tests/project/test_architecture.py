@@ -106,7 +106,7 @@ def test_no_module_imports_itself_by_others():
         "from tiengine.engine.stepper import Stepper",
         "import tiengine.cli.commands",
         "from tiengine import simulation",
-        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from tiengine.engine.state import State",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from tiengine.engine.sine_state import SineState",
         "def lazy():\n    from tiengine.report import page",
         "from tiengine.nowhere import thing",
     ],

@@ -89,10 +89,10 @@ def test_every_key_is_described():
 
 
 def test_reference_knows_unit_range_and_default():
-    """Rows written by hand: a bound, a number or a word, a list, a nested table, a required part."""
+    """Rows written by hand from the declarations: bound, number or word, list, nested table, required part."""
     text = page()
     for row in (
-        "| `distance` | number | m | > 0, ≤ 1e6 | required | way of the train |",
+        "| `distance` | number | m | > 0, ≤ 1e6 | required | distance the train covers |",
         '| `window` | number or `"auto"` | m | 1 to 2000 | `"auto"` |',
         "| `v` | list of numbers | m/s | ≥ 0 | [0] | rates |",
         "| `damping` | number | N s/m^3 | ≥ 0 | required | vertical damping c_m per area |",

@@ -1,7 +1,4 @@
-"""Commands that read results: ``tiengine info``, ``metrics``, ``plot``, ``report``; none of them needs Taichi to begin.
-
-:data:`COMMANDS` joins the group of :mod:`tiengine.cli.commands`.
-"""
+"""Commands that read results: ``tiengine info``, ``metrics``, ``plot``, ``report``, ``export``; none imports Taichi."""
 
 from __future__ import annotations
 
@@ -23,7 +20,7 @@ __all__ = ["COMMANDS"]
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 def info(file: Path) -> None:
-    """Say what a result FILE holds and how it was made."""
+    """Describe the contents and the origin of a result FILE."""
     from tiengine import result as results
 
     with results.open(file) as result:
@@ -44,10 +41,12 @@ def info(file: Path) -> None:
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--train", type=click.IntRange(0), help="One train of an ensemble; default: all, summarised.")
-@click.option("--json", "output", type=click.Path(path_type=Path), help="Write all indices here too, replacing a file.")
+@click.option("--train", type=click.IntRange(0), help="Index of one train of an ensemble; default: summary of all.")
+@click.option(
+    "--json", "output", type=click.Path(path_type=Path), help="Also write all indices to this file, replacing it."
+)
 def metrics(file: Path, train: int | None, output: Path | None) -> None:
-    """Indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 for a result FILE, beside their limits."""
+    """Evaluate the indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 for a result FILE, with their limits."""
     from tiengine import result as results
     from tiengine.report import metrics_table
     from tiengine.result_files.output_file import check_output
@@ -63,12 +62,18 @@ def metrics(file: Path, train: int | None, output: Path | None) -> None:
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Ends in .csv, .parquet or .mat.")
-@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Train of an ensemble.")
-@click.option("--channel", "channels", multiple=True, help="GROUP or GROUP/CHANNEL; may be repeated; default: wheel.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="File to write, ending in .csv, .parquet or .mat.",
+)
+@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Index of the train.")
+@click.option("--channel", "channels", multiple=True, help="GROUP or GROUP/CHANNEL; can be repeated; default: wheel.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def export(file: Path, output: Path, train: int, channels: Sequence[str], force: bool) -> None:
-    """Write channels of a result FILE as CSV, Parquet or MATLAB (docs/results.md)."""
+    """Export channels of a result FILE to CSV, Parquet or MATLAB (docs/results.md)."""
     from tiengine import result as results
     from tiengine.result_files import export as exporting
 
@@ -80,11 +85,13 @@ def export(file: Path, output: Path, train: int, channels: Sequence[str], force:
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.argument("kind", type=click.Choice(names()), required=False)
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Figure (.png, .pdf, .svg) or folder.")
-@click.option("--with", "other", type=click.Path(path_type=Path), help="Second file, of kind compare.")
-@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="One train of an ensemble.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Figure to write (.png, .pdf, .svg), or a folder."
+)
+@click.option("--with", "other", type=click.Path(path_type=Path), help="Second result, for the kind compare.")
+@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Index of the train.")
 def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, train: int) -> None:
-    """Draw figures of a result FILE: one KIND, or all that it can give, into FILE_KIND.png; replaces figures."""
+    """Draw one KIND of figure of a result FILE, or all available ones, as FILE_KIND.png; replaces existing figures."""
     from tiengine import result as results
     from tiengine.figures.files import draw_all, draw_one
 
@@ -101,11 +108,11 @@ def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Page to write, replacing one; FILE.html if none."
+    "-o", "--output", type=click.Path(path_type=Path), help="Page to write, replacing it; default: FILE.html."
 )
-@click.option("--train", type=click.IntRange(0), help="Whose figures; default: the first that ran to its end.")
+@click.option("--train", type=click.IntRange(0), help="Index of the train to draw; default: the first complete one.")
 def report(file: Path, output: Path | None, train: int | None) -> None:
-    """Make one HTML page of a result FILE: scenario, key figures, indices and figures; it needs no network."""
+    """Write a self-contained HTML page of a result FILE: scenario, key figures, indices and figures."""
     from tiengine import result as results
     from tiengine.report import page as reporting
 
@@ -120,9 +127,9 @@ def _text(value: Any) -> str:
 
 
 def _groups(train: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Name of every group of a train, with its samples and channels."""
+    """Name of each group of a train, with its number of samples and its channels."""
     for name, group in train.items():
-        if not hasattr(group, "keys"):  # the train's own time is a dataset
+        if not hasattr(group, "keys"):  # format version 1 has a dataset "time" here
             continue
         channels = {key: dataset for key, dataset in group.items() if "coordinates" in dataset.attrs}
         if channels:
@@ -135,3 +142,4 @@ def _groups(train: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
 
 
 COMMANDS = (info, metrics, plot, report, export)
+"""Added to the group of :mod:`tiengine.cli.commands`."""

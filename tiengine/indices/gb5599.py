@@ -1,12 +1,12 @@
 """GB/T 5599-2019: stability, ride quality and the Sperling index W.
 
-Wheel forces: low pass of 20 Hz, means over 2 m every 0.5 m, largest value of the run (not the statistics of sections of
-appendix D, so that all are indices, no assessments). With Q the lateral, P the vertical force of
-a wheel, P0 the static axle load:
+Wheel forces: low pass of 20 Hz, means over 2 m every 0.5 m, largest value of the run. The statistics over sections of
+appendix D are not implemented, so that all values are indices, not assessments. With Q the lateral and P the vertical
+force of a wheel:
 
     derailment coefficient Q/P,  wheel unloading (P_static - P)/P_static,  lateral axle force |Q_left + Q_right|.
 
-Sperling, from the amplitudes A [m/s^2] of a 5 s block's spectrum between 0.5 and 40 Hz, f [Hz]:
+Sperling index, from the amplitudes A [m/s^2] of the spectrum of a 5 s block between 0.5 and 40 Hz, f [Hz]:
 
     W = (sum W_i^10)^(1/10),   W_i = 3.57 (A_i^3 F(f_i) / f_i)^(1/10)
 
@@ -41,7 +41,7 @@ Direction = Literal["vertical", "lateral"]
 
 STANDARD = "GB/T 5599-2019"
 BLOCK = 5.0  # s
-BAND = (0.5, 40.0)  # Hz, of the Sperling index
+BAND = (0.5, 40.0)  # Hz, for the Sperling index
 ACCELERATION_BAND = (0.5, 10.0)  # Hz
 ACCELERATION_LIMIT = 2.5  # m/s^2
 DERAILMENT_LIMIT = 0.8
@@ -52,19 +52,19 @@ CURVES = {"vertical": (0.325, 5.9, 400.0, 20.0), "lateral": (0.8, 5.4, 650.0, 26
 
 
 def sperling_weight(frequency: Reals, direction: Direction) -> Reals:
-    """F at some frequencies [Hz]."""
+    """Evaluate the weight F at frequencies [Hz], shape (n,)."""
     rise, first, fall, second = CURVES[direction]
     f = np.asarray(frequency, np.float64)
     return np.where(f < first, rise * f**2, np.where(f < second, fall / np.maximum(f, first) ** 2, 1.0))
 
 
 def sperling(series: Reals, interval: float, direction: Direction) -> float | None:
-    """Sperling index of the worst 5 s block.
+    """Compute the Sperling index of the worst 5 s block.
 
     Args:
         series: Acceleration [m/s^2], shape (n,).
-        interval: Between samples [s].
-        direction: Which weight.
+        interval: Time between samples [s].
+        direction: Direction of the acceleration, which selects the weight.
 
     Returns:
         W, or None if the series is shorter than a block.
@@ -82,22 +82,22 @@ def sperling(series: Reals, interval: float, direction: Direction) -> float | No
 
 
 def unloading(P: Reals, static: float) -> float:
-    """Largest part of the static load that a wheel has lost.
+    """Compute the largest relative unloading of a wheel.
 
     Args:
         P: Vertical force, shape (n,).
-        static: Load at rest, in the same unit.
+        static: Static load, in the same unit.
     """
     return float((static - P.min()) / static)
 
 
 def unloading_limit(speed: float) -> float:
-    """Largest part of its static load that a wheel may lose, at a speed [m/s]."""
+    """Return the limit of wheel unloading at a speed [m/s]."""
     return UNLOADING_LIMITS[speed > SLOW + 1e-9]
 
 
 def axle_force_limit(static: float) -> float:
-    """Limit of the lateral axle force [kN].
+    """Return the limit of the lateral axle force [kN].
 
     Args:
         static: Static load of the wheelset, both wheels [kN].
@@ -106,17 +106,17 @@ def axle_force_limit(static: float) -> float:
 
 
 def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
-    """Derailment coefficient, wheel unloading and lateral axle force at the worst wheel or wheelset."""
+    """Yield derailment coefficient, wheel unloading and lateral axle force of the worst wheel or wheelset."""
     found: dict[str, list[Index]] = {}
     for w in ride.wheelsets(vehicle):
-        for name, side, value, unit, limit in _of_wheelset(ride.forces(w), ride.speed):
+        for name, side, value, unit, limit in _wheelset_values(ride.forces(w), ride.speed):
             index = _index(ride, vehicle, name, f"wheelset {w + 1}{side}", value, unit, limit, "cl. 9, 10, app. D")
             found.setdefault(name, []).append(index)
     yield from map(worst, found.values())
 
 
-def _of_wheelset(forces: Forces, speed: float) -> Iterator[tuple[str, str, float, str, float]]:
-    """Name, side, value, unit, limit."""
+def _wheelset_values(forces: Forces, speed: float) -> Iterator[tuple[str, str, float, str, float]]:
+    """Yield name, side, value, unit and limit of each index."""
     for i, side in enumerate((" left", " right")):
         _, quotient = sliding_mean(forces.position, forces.quotient[:, i])
         yield "derailment coefficient", side, float(np.abs(quotient).max()), "-", DERAILMENT_LIMIT
@@ -128,7 +128,7 @@ def _of_wheelset(forces: Forces, speed: float) -> Iterator[tuple[str, str, float
 
 
 def body_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
-    """Sperling index and body acceleration at the worst floor point over a bogie."""
+    """Yield Sperling indices and accelerations at the worst floor point over a bogie."""
     points = [point for point in ride.floor(vehicle) if point.over_bogie]
     directions: tuple[Direction, ...] = ("lateral", "vertical")
     for direction in directions:
@@ -137,7 +137,7 @@ def body_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
 
 
 def _sperling_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Direction) -> Index:
-    series = ride.behind_run_in(getattr(point, direction))
+    series = ride.after_run_in(getattr(point, direction))
     value = sperling(series, ride.body_interval, direction)
     if value is None:
         note = "run shorter than a block of 5 s"
@@ -153,7 +153,7 @@ def _acceleration_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Dir
     value, note = None, "run shorter than a period of 0.5 Hz, 2 s"
     if ride.duration * ACCELERATION_BAND[0] >= 1.0:
         series = band_pass(getattr(point, direction), ride.body_interval, *ACCELERATION_BAND)
-        value, note = float(np.abs(ride.behind_run_in(series)).max()), ""
+        value, note = float(np.abs(ride.after_run_in(series)).max()), ""
     return _index(
         ride, vehicle, f"{direction} acceleration", point.name, value, "m/s^2", ACCELERATION_LIMIT,
         "cl. 9, app. D", note,
@@ -164,8 +164,8 @@ def _index(
     ride: Ride, vehicle: int, name: str, place: str, value: float | None, unit: str, limit: float, clause: str,
     note: str = "",
 ) -> Index:  # fmt: skip
-    lacks = f"largest value on {ride.way:.0f} m instead of the statistics of sections of app. D"
+    reason = f"largest value over {ride.distance:.0f} m instead of the statistics over sections of app. D"
     return Index(
         standard=STANDARD, name=name, vehicle=vehicle + 1, place=place, value=value, unit=unit, limit=limit,
-        clause=clause, shortfall=lacks, note=note,
+        clause=clause, shortfall=reason, note=note,
     )  # fmt: skip

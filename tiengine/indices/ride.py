@@ -1,12 +1,12 @@
-"""One train of a result file as the standards see it: wheel forces by wheelset, accelerations at points of the floor.
+"""One train of a result file as the standards require it: forces by wheelset, accelerations at floor points.
 
-Floor points lie over the bogies' centres (the mean of the axles of either half of the vehicle) and in the middle of the
-car, 1 m to either side of its centre line, 1.25 m above the rail. With (X, Y, Z) from the car's centre of gravity (x
-forward, y right, z down) a point is accelerated by
+Floor points lie over the bogie centres (the mean of the axles in each half of the vehicle) and in the middle of the
+car, 1 m to either side of its centre line, 1.25 m above the rail. At (X, Y, Z) from the car's centre of gravity (x
+forward, y right, z down) the accelerations are
 
     lateral   y'' + X yaw'' - Z roll'',      vertical   z'' - X pitch'' + Y roll''.
 
-What gravity adds to the reading of a tilted accelerometer is left out.
+The contribution of gravity to the reading of a tilted accelerometer is left out.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ if TYPE_CHECKING:
 
 __all__ = ["FORCE_CUT_OFF", "FloorPoint", "Forces", "Ride"]
 
-FLOOR_HEIGHT = 1.25  # m above the rail: that of high-speed platforms; vehicle data do not give it
-FLOOR_OFFSET = 1.0  # m beside the centre line, as GB/T 5599 has it
+FLOOR_HEIGHT = 1.25  # m above the rail: height of high-speed platforms; vehicle data do not give it
+FLOOR_OFFSET = 1.0  # m from the centre line, as in GB/T 5599
 FORCE_CUT_OFF = 20.0  # Hz
-LEAST_RATE = 200.0  # Hz: that of EN 14363, and twice the upper band limit of the weightings
-LEAST_WAY = 10.0  # m behind the run-in
-UNLOADED = 0.01  # of the static load: a wheel off the rail has no quotient, one that hardly touches no meaningful one
+LEAST_RATE = 200.0  # Hz: as in EN 14363, and twice the upper band limit of the weightings
+LEAST_DISTANCE = 10.0  # m after the run-in
+UNLOADED = 0.01  # of the static load, least Q in a quotient: that of a wheel that hardly touches means nothing
 
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Forces of a wheelset on the rails behind the run-in, low pass of 20 Hz.
+    """Forces of a wheelset on the rails after the run-in, low pass of 20 Hz.
 
     Attributes:
-        position: Chainage of the train [m], shape (n,).
-        Y: Lateral, left and right, positive to the right [N], shape (n, 2).
-        Q: Vertical, positive down [N], shape (n, 2).
-        static: Load of the left and the right wheel at rest [N], shape (2,).
+        position: Chainages of the train [m], shape (n,).
+        Y: Lateral forces, left and right, positive to the right [N], shape (n, 2).
+        Q: Vertical forces, left and right, positive down [N], shape (n, 2).
+        static: Static loads of the left and the right wheel [N], shape (2,).
     """
 
     position: Reals
@@ -56,19 +56,19 @@ class Forces:
 
     @property
     def quotient(self) -> Reals:
-        """Y/Q, outward positive, shape (n, 2); a wheel that has lifted off counts with 1 % of its static load."""
+        """Y/Q, outward positive, shape (n, 2); Q of an unloaded wheel is taken as 1 % of its static load."""
         return np.array([-1.0, 1.0]) * self.Y / np.maximum(self.Q, UNLOADED * self.static)
 
 
 @dataclass(frozen=True, eq=False)
 class FloorPoint:
-    """Accelerations of a point of a car's floor over the whole run, run-in included.
+    """Accelerations of a floor point over the whole run, run-in included.
 
     Attributes:
-        name: Where it is.
+        name: Name of its place.
         over_bogie: Whether it lies over a bogie.
-        lateral: [m/s^2], shape (n,).
-        vertical: [m/s^2], shape (n,).
+        lateral: Lateral acceleration [m/s^2], shape (n,).
+        vertical: Vertical acceleration [m/s^2], shape (n,).
     """
 
     name: str
@@ -81,20 +81,20 @@ class Ride:
     """One train of a result.
 
     Attributes:
-        way: Way behind the run-in [m].
+        distance: Distance after the run-in [m].
         speed: Largest speed [m/s].
     """
 
     def __init__(self, result: Reader, train: int = 0, scenario: Scenario | None = None) -> None:
-        """Check what is there; nothing but times is read yet.
+        """Check the file; only times and positions are read yet.
 
         Args:
             result: An open file.
-            train: Index of the train.
-            scenario: The train's own, for who has it already; read from the file if None.
+            train: Number of the train.
+            scenario: Scenario of this train if known; read from the file if None.
 
         Raises:
-            InputError: The file lacks what the indices need, is sampled too rarely, or the run is too short.
+            InputError: The file lacks what the indices need, the sampling is too coarse, or the run is too short.
         """
         self._where = f"{result.name}: train {train}"
         scenario = scenario or recorded_scenario(result).members[train]
@@ -107,11 +107,11 @@ class Ride:
         self.body_interval = self._interval(self._body["time"][:], "body_interval")
         position = self._body["position"][:]
         self._begin = float(position[0]) + self._run_in
-        self.way = float(position[-1]) - self._begin
-        if self.way < LEAST_WAY:
+        self.distance = float(position[-1]) - self._begin
+        if self.distance < LEAST_DISTANCE:
             raise InputError(
                 f"{self._where}: {position[-1] - position[0]:.4g} m are too short: output.run_in = {self._run_in:g}"
-                f" must leave {LEAST_WAY:g} m"
+                f" must leave {LEAST_DISTANCE:g} m"
             )
         self._keep_body = position >= self._begin
         names = list(self._body["body"].asstr()[:])
@@ -125,15 +125,15 @@ class Ride:
 
     @property
     def duration(self) -> float:
-        """Time behind the run-in [s]."""
+        """Time after the run-in [s]."""
         return float(self._keep_body.sum()) * self.body_interval
 
     def wheelsets(self, vehicle: int) -> list[int]:
-        """Wheelsets of a vehicle, numbered through the train from 0."""
+        """Return the wheelsets of a vehicle, numbered through the train from 0."""
         return [int(i) for i in np.flatnonzero(self._model.wheelset_vehicle == vehicle)]
 
     def forces(self, wheelset: int) -> Forces:
-        """Forces of one wheelset."""
+        """Read and filter the forces of one wheelset."""
         position = self._wheel["position"][:]
         keep = position >= self._begin
         Y, Q = (
@@ -143,10 +143,10 @@ class Ride:
         return Forces(position[keep], Y, Q, self._static[wheelset])
 
     def floor(self, vehicle: int) -> list[FloorPoint]:
-        """Points of a car's floor.
+        """Compute the accelerations of a vehicle's floor points.
 
         Raises:
-            InputError: The vehicle is made of wheelsets alone.
+            InputError: The vehicle consists of wheelsets only.
         """
         coach = self.vehicles[vehicle]
         bodies = [body for body in coach.body if not body.wheelset]
@@ -164,14 +164,14 @@ class Ride:
                 points.append(FloorPoint(f"floor {where} {side}", where != "middle", lateral, vertical))
         return points
 
-    def behind_run_in(self, series: Reals) -> Reals:
-        """Samples of the bodies that statistics use."""
+    def after_run_in(self, series: Reals) -> Reals:
+        """Select the samples after the run-in of a series of the bodies, shape (n,)."""
         kept: Reals = series[self._keep_body]
         return kept
 
     @cached_property
     def body_position(self) -> Reals:
-        """Chainage of the bodies' samples behind the run-in [m]."""
+        """Chainages of the bodies' samples after the run-in [m], shape (n,)."""
         return np.asarray(self._body["position"][:][self._keep_body])
 
     @cached_property
@@ -192,7 +192,7 @@ class Ride:
         return train[name]
 
     def _interval(self, time: Reals, key: str) -> float:
-        """Time between samples [s]."""
+        """Time between samples [s], which must be constant."""
         if len(time) < 2:
             raise InputError(f"{self._where}: output.{key}: too short, {len(time)} sample(s)")
         steps = np.diff(time)
@@ -208,7 +208,7 @@ class Ride:
 
 
 def _stations(coach: Vehicle) -> dict[str, float]:
-    """Places along the car, forward of its middle [m]."""
+    """Places of floor points along the car, forward of its middle [m], by name."""
     axles = coach.axle_positions
     half = (len(axles) + 1) // 2
     return {

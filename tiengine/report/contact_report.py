@@ -1,7 +1,7 @@
-"""What ``tiengine contact`` shows of a wheel on a rail: rolling-radius difference, conicity, points of contact.
+"""Contact geometry of a wheel on a rail, for ``tiengine contact``: rolling radii, conicity, contact points.
 
-The wheelset is shifted sideways on straight track, its roll follows (:mod:`tiengine.contact.conicity`). Conicity is
-that of harmonic linearisation; what EN 15302 gets by integrating the motion is compared in ``docs/files.md``.
+The wheelset is shifted laterally on straight track and its roll follows (:mod:`tiengine.contact.conicity`). Conicity is
+that of harmonic linearisation; ``docs/files.md`` compares it with the integration of EN 15302.
 """
 
 from __future__ import annotations
@@ -28,15 +28,16 @@ __all__ = ["ContactReport", "contact_report", "draw"]
 REFERENCE_AMPLITUDE = 3e-3
 """Amplitude at which conicities are compared [m], EN 15302."""
 SHIFT_STEP = 0.05e-3
+"""Step of the lateral shift [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContactReport:
-    """Contact of a wheelset over its shift to the right.
+    """Contact of a wheelset over its lateral shift to the right.
 
     Attributes:
         pair: Wheel and rail.
-        shift: Shifts y [m], shape (n,), from the largest to the left to the largest to the right.
+        shift: Shifts y [m], shape (n,), from the largest one to the left to the largest one to the right.
         radius_difference: Right less left rolling radius [m], shape (n,).
         roll: Roll, right-handed about x forward [rad], shape (n,).
         wheel_station: Contact on the right wheel, outward from the tape circle [m], shape (n,).
@@ -62,16 +63,16 @@ class ContactReport:
         return float(self.conicity[np.argmin(np.abs(self.amplitude - REFERENCE_AMPLITUDE))])
 
     def rows(self) -> list[tuple[str, str]]:
-        """Words and values of the table on screen."""
+        """Return names and values of the table on screen."""
         rows = [("equivalent conicity at 3 mm", f"{self.reference_conicity:.4f}")]
         for A, conicity in zip(self.amplitude[1::2], self.conicity[1::2], strict=False):
             difference = float(np.interp(A, self.shift, self.radius_difference))
-            words = f"rolling-radius difference {difference * 1e3:.3f} mm, conicity {conicity:.4f}"
-            rows.append((f"{A * 1e3:g} mm", words))
+            value = f"rolling-radius difference {difference * 1e3:.3f} mm, conicity {conicity:.4f}"
+            rows.append((f"{A * 1e3:g} mm", value))
         return rows
 
     def to_json(self) -> str:
-        """All numbers, in SI, as JSON."""
+        """Return all numbers, in SI units, as JSON."""
         placement = {"gauge", "gauge_depth", "cant", "half_spacing", "wheel_radius"}
         settings = self.pair.settings.model_dump(include=placement)
         content: dict[str, Any] = {
@@ -87,16 +88,16 @@ class ContactReport:
 
 
 def contact_report(wheel: Profile, rail: Profile, settings: ContactSettings, largest: float = 8e-3) -> ContactReport:
-    """Compute contact geometry.
+    """Compute the contact geometry.
 
     Args:
         wheel: Wheel profile.
         rail: Rail profile.
-        settings: Gauge, cant, tape circles' distance, radius.
+        settings: Gauge, cant, spacing of the tape circles, wheel radius.
         largest: Largest shift and amplitude [m].
 
     Raises:
-        InputError: ``largest`` is below 3 mm, or profiles that do not reach as far as the shift.
+        InputError: ``largest`` is not between 3 and 20 mm, or a profile ends before the shift is reached.
     """
     if not REFERENCE_AMPLITUDE <= largest <= 20e-3:
         raise InputError(f"largest shift = {largest * 1e3:g} mm: must be 3 to 20 mm")
@@ -119,14 +120,14 @@ def contact_report(wheel: Profile, rail: Profile, settings: ContactSettings, lar
 
 
 def draw(report: ContactReport, path: Path) -> None:
-    """Draw rolling-radius difference, conicity, and the profiles with lines between points in contact.
+    """Draw rolling-radius difference, conicity, and the profiles with lines between contact points.
 
     Args:
-        report: What to draw.
-        path: Figure; the suffix tells the format.
+        report: The contact geometry.
+        path: Path of the figure; the suffix selects the format.
 
     Raises:
-        InputError: A suffix that is no format of figures, or a file that cannot be written.
+        InputError: The suffix is not a figure format, or the file cannot be written.
     """
     from matplotlib.figure import Figure
 
@@ -184,7 +185,7 @@ def _draw_angle(axes: Axes, report: ContactReport) -> None:
 
 
 def _draw_profiles(axes: Axes, report: ContactReport) -> None:
-    """The right wheel in its place, lifted off the rail, at one scale; lines join what touches at each millimetre."""
+    """Draw the right wheel lifted off its rail, to scale, with lines between contact points every millimetre."""
     pair, lift = report.pair, 14.0
     offset = (pair.settings.half_spacing - pair.crown_offset) * 1e3
     s, o = np.linspace(*pair.wheel.span, 600), np.linspace(*pair.canted_rail.span, 600)
@@ -197,7 +198,7 @@ def _draw_profiles(axes: Axes, report: ContactReport) -> None:
         ends = [offset + wheel * 1e3, rail * 1e3]
         heights = [float(pair.wheel.height(wheel)) * 1e3 - lift, float(pair.canted_rail.height(rail)) * 1e3]
         axes.plot(ends, heights, "o-", color=VERMILION, markersize=3, linewidth=0.8)
-        if abs(ends[0] - labelled) > 2.5 or i == middle:  # else the numbers overlap
+        if abs(ends[0] - labelled) > 2.5 or i == middle:  # otherwise the labels overlap
             labelled = ends[0]
             label = f"{report.shift[i] * 1e3:.0f}"
             axes.annotate(label, (ends[0], heights[0]), (0, 5), textcoords="offset points", ha="center", fontsize=7)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation.simulate import prepare
@@ -42,10 +42,10 @@ def _reference() -> NDArray[np.float64]:
     scenario = load_scenario("paper", [*SHORT, "numerics.time_step=1e-4"])
     model, _ = prepare(scenario)
     V = scenario.train.speed.at(0.0)[0]
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     equilibrium(model, state, 0.0, V)
-    track = make_irregularity(scenario.irregularity, float(model.wheel_s.max()))
-    equations = SemiDiscrete(model, track, V, range(model.given.slots))
+    track = make_irregularity(scenario.irregularity, float(model.ingredients.wheel_s.max()))
+    equations = SemiDiscrete(model, track, V, range(model.ingredients.slots))
     times = np.arange(1, round(DURATION / SAMPLE) + 1) * SAMPLE
     found = solve_ivp(
         equations.rhs,

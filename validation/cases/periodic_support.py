@@ -18,14 +18,17 @@ modes, which falls as 1/N: 8 modes per metre leave 0.6 %, hence 12 a metre for t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.chunk import Chunk
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.stepper import Stage
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
@@ -48,20 +51,20 @@ DEFAULT = (28.0, 182, 2e-4)  # of a default scenario: window [m], modes, step [s
 SOURCE = "infinite Timoshenko rail on discrete springs, Floquet transform"
 
 
-class _Loaded(Stepper):
-    """The engine's step with a load in the middle of the left rail, added to F after its forces."""
+class _Loaded(SineStepper):
+    """The engine's step with a load in the middle of the left rail, added to what its forces have left in F."""
 
-    def __init__(self, model: Model, state: State, chunk: Chunk) -> None:
-        super().__init__(model, state, chunk)
-        given = model.given
+    def __init__(self, model: Model, state: SineState, chunk: Chunk) -> None:
         self.weight = 0.0
-        self._shape = model.window.shape(np.array([given.length / 2.0]))[0]
-        stages = []
-        for name, stage in self.stages:
-            stages.append((name, stage))
+        self._shape = model.window.shape(np.array([model.ingredients.length / 2.0]))[0]
+        super().__init__(model, state, chunk)
+
+    def _stages(self) -> Iterator[Stage]:
+        """Stages of the step, the load after its forces."""
+        for name, call in super()._stages():
+            yield name, call
             if name == "forces and contact":
-                stages.append(("load", self._load_rail))
-        self.stages = tuple(stages)
+                yield "load", self._load_rail
 
     def _load_rail(self) -> None:
         self.state.view(at.F, "vertical")[0, 0, : len(self._shape)] += self.weight * self._shape
@@ -94,14 +97,14 @@ def _seats() -> Seats:
     return Seats(given.slab.fastening_pitch, given.fastening.vertical_stiffness, given.fastening.vertical_damping)
 
 
-def _prepare(model: Model, V: float, steps: int) -> tuple[State, Chunk, _Loaded, Reals]:
+def _prepare(model: Model, V: float, steps: int) -> tuple[SineState, Chunk, _Loaded, Reals]:
     """Weightless wheels over a lowered track, slabs far behind; window's rear end at every step."""
     model.vehicle_load[:] = 0.0
-    state, chunk = State.at_rest(model), Chunk.empty(model, steps, 1, 1)
+    state, chunk = SineState.at_rest(model), Chunk.empty(model.ingredients, steps, 1, 1)
     stepper = _Loaded(model, state, chunk)
     felt = np.zeros_like(chunk.irregularity)
     felt[..., at.Z_V] = 1.0
-    X = V * model.given.newmark.dt * np.arange(1.0, steps + 1)
+    X = V * model.ingredients.newmark.dt * np.arange(1.0, steps + 1)
     stepper.load(X, np.full(steps, V), np.zeros(steps), felt)
     chunk.clock[:, at.FIRST_SLAB] = -1000
     return state, chunk, stepper, X

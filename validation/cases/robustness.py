@@ -135,7 +135,7 @@ CASES = (
         kind="verification",
         quantity="mean vertical force of 24 wheels in three vehicles [kN]",
         source="static wheel load",
-        reference=lambda: np.full(24, 1e-3 * static_wheel_loads(paper_model().given.train).mean()),
+        reference=lambda: np.full(24, 1e-3 * static_wheel_loads(paper_model().ingredients.train).mean()),
         rtol=0.02,
         why="means over 6 s of an irregular track",
         compute=lambda: 1e-3 * simulate("train3").vertical.mean(axis=0).ravel(),

@@ -13,7 +13,7 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from tiengine.engine.equilibrium import ContactForces, evaluate_contact
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.irregularity.irregularity import Irregularity
 from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
@@ -36,7 +36,7 @@ class SemiDiscrete:
             slabs: All slabs that the window touches, from its beginning to its end.
         """
         self.model, self.track, self.V, self.slabs = model, track, V, slabs
-        g = model.given
+        g = model.ingredients
         sound, train = g.designs.matrices[0], g.train
         rail = [
             la.block_diag(*(m.toarray() for m in pair))
@@ -55,8 +55,8 @@ class SemiDiscrete:
         self._seats()
 
     def _seats(self) -> None:
-        """Slab side of every fastening that can be in the window, with stiffness and damping."""
-        g, sound = self.model.given, self.model.given.designs.matrices[0]
+        """The slabs' side of every fastening that can stand in the window, and stiffness and damping."""
+        g, sound = self.model.ingredients, self.model.ingredients.designs.matrices[0]
         f, b = g.fastening, g.rail.half_base
         self.seats = np.arange(self.slabs.start * g.slab.fastenings, self.slabs.stop * g.slab.fastenings)
         self.on_slab = np.zeros((len(self.seats), 2, 3, self.n))
@@ -72,9 +72,9 @@ class SemiDiscrete:
         self.c = np.array([f.vertical_damping, f.vertical_damping, f.lateral_damping])
 
     def shapes(self, t: float) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
-        """Seats in the window at time t, the rails' trial functions there and their rates -V d/ds."""
-        s = (self.seats + 0.5) * self.model.given.slab.fastening_pitch - self.V * t
-        here = (s > 0.0) & (s < self.model.given.length)
+        """Which seats stand in the window at time t, the rails' shape there and its rate -V d/ds."""
+        s = (self.seats + 0.5) * self.model.ingredients.slab.fastening_pitch - self.V * t
+        here = (s > 0.0) & (s < self.model.ingredients.length)
         k = self.model.window.wave_numbers
         return here, np.sin(np.outer(s[here], k)), -self.V * k * np.cos(np.outer(s[here], k))
 
@@ -122,7 +122,7 @@ class SemiDiscrete:
         return self._contact(t, u[self.dof][None], v[self.dof][None], self.under_wheels(u, v)[None])
 
     def _contact(self, t: float, *motion: NDArray[np.float64]) -> ContactForces:
-        felt = self.track.sample(self.V * t + self.model.wheel_s)
+        felt = self.track.sample(self.V * t + self.model.ingredients.wheel_s)
         return evaluate_contact(self.model, self.V, felt, *motion)
 
     def rhs(self, t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -143,7 +143,7 @@ class SemiDiscrete:
 
     def _on_vehicle(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Gravity, nonlinear suspension, gyroscopic pair of the pitch rates."""
-        train = self.model.given.train
+        train = self.model.ingredients.train
         motion = np.stack([u, v, train.gravity])
         suspension_forces(
             train.n, train.element_index, train.element_row, train.element_kind, train.element_linear,
@@ -195,8 +195,8 @@ class SemiDiscrete:
             out.append(rows)
         return out
 
-    def pack(self, state: State) -> NDArray[np.float64]:
-        """Vector y of an engine's state whose window begins at the first of the slabs."""
+    def pack(self, state: SineState) -> NDArray[np.float64]:
+        """The y of an engine's state whose window begins at the first of the slabs."""
         halves = []
         for row in (at.U, at.V):
             vertical, lateral = state.view(row, "vertical")[0], state.view(row, "lateral")[0]

@@ -11,9 +11,10 @@ from functools import cache
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.kernels import layout as at
 from tiengine.parameters.arrays import Reals
 from tiengine.vehicle.train import static_wheel_loads
@@ -34,7 +35,7 @@ def _last(values: Reals) -> Reals:
 
 def _static() -> Reals:
     """Static load of the eight wheels [N], shape (8,)."""
-    return static_wheel_loads(paper_model().given.train).ravel()
+    return static_wheel_loads(paper_model().ingredients.train).ravel()
 
 
 def _passing_share() -> float:
@@ -55,11 +56,11 @@ def _ripple() -> Reals:
 def _supported() -> tuple[float, float]:
     """Mean of all fastening forces, and of all wheel forces on the rails, over two slabs [N]."""
     model = paper_model(dt=DT)
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     equilibrium(model, state, 0.0, V)
     count = 2 * STEPS // SLABS
-    chunk = Chunk.empty(model, 2 * count, 2 * count, 1)
-    stepper = Stepper(model, state, chunk)
+    chunk = Chunk.empty(model.ingredients, 2 * count, 2 * count, 1)
+    stepper = SineStepper(model, state, chunk)
     X = V * DT * np.arange(1.0, 2 * count + 1)
     stepper.load(X, np.full(2 * count, V), np.zeros(2 * count), np.zeros_like(chunk.irregularity))
     seats = []

@@ -12,9 +12,10 @@ from functools import cache
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import Scenario, load_scenario
@@ -92,10 +93,10 @@ def _seats_of_window() -> Reals:
     scenario = _scenario()
     V, chosen = scenario.train.speed.fastest, np.array([*NEIGHBOURS, *VOID_SEATS])
     model, _ = prepare_window(scenario)
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     equilibrium(model, state, scenario.rear, V)
     steps = int(scenario.train.distance / (V * FINE))
-    stepper = Stepper(model, state, Chunk.empty(model, steps, 1, 1))
+    stepper = SineStepper(model, state, Chunk.empty(model.ingredients, steps, 1, 1))
     X = scenario.rear + V * FINE * np.arange(1.0, steps + 1)
     stepper.load(X, np.full(steps, V), np.zeros(steps), np.zeros_like(stepper.chunk.irregularity))
     forces = np.zeros((steps, len(chosen)))

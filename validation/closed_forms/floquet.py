@@ -29,6 +29,10 @@ seat's damper jumps, and R jumps down by
 
 (the second factor: the jump's own shear waves). The jump at a seat reaches its neighbours as a smaller one.
 
+A seat with a length presses at the points x_n + xi_g, with the shares a_g of its force, and feels the same mean of the
+rail: the load alone moves it by m(omega / V) = sum_g a_g cos(omega xi_g / V) times as much, its neighbours and itself
+by g's mean over both sets of points.
+
 | here | the engine |
 |---|---|
 | w, R, P positive down, seat force on the ground | w, F_V |
@@ -63,11 +67,15 @@ class Seats:
         pitch: d [m].
         stiffness: k [N/m].
         damping: c [N s/m], above 0.
+        offset: Points xi_g at which a seat presses, from its middle and symmetric about it, within d / 2 [m].
+        share: Shares a_g of its force there, of sum one.
     """
 
     pitch: float
     stiffness: float
     damping: float
+    offset: tuple[float, ...] = (0.0,)
+    share: tuple[float, ...] = (1.0,)
 
     def impedance(self, omega: Complexes) -> Complexes:
         """Z = k + i omega c [N/m]."""
@@ -102,7 +110,7 @@ def waves(beam: Beam, omega: Complexes) -> tuple[Complexes, Complexes]:
 
 
 def free_rail(beam: Beam, seats: Seats, omega: Complexes, phase: Complexes, x: float) -> Complexes:
-    """Sum of g(x - n d) exp(-i phase n) over all seats n, for 0 <= x < d [m/N], shape (n,).
+    """Sum of g(x - n d) exp(-i phase n) over all seats n [m/N], shape (n,).
 
     Args:
         beam: The rail.
@@ -111,10 +119,11 @@ def free_rail(beam: Beam, seats: Seats, omega: Complexes, phase: Complexes, x: f
         phase: Lag from seat to seat [rad], omega d / V for a moving load.
         x: Position from seat 0 [m].
     """
+    turns, x = divmod(x, seats.pitch)
     kappa, amplitude = waves(beam, omega)
     behind, ahead = np.exp(-1j * (kappa * seats.pitch - phase)), np.exp(-1j * (kappa * seats.pitch + phase))
     near = np.exp(-1j * kappa * x) / (1.0 - behind) + np.exp(1j * kappa * x) * ahead / (1.0 - ahead)
-    total: Complexes = np.sum(amplitude * near, axis=0)
+    total: Complexes = np.sum(amplitude * near, axis=0) * np.exp(-1j * phase * turns)
     return total
 
 
@@ -127,7 +136,13 @@ def _frequencies(V: float) -> Complexes:
 def _seat_spectrum(beam: Beam, seats: Seats, V: float, P: float, omega: Complexes) -> Complexes:
     """R^ [N s]."""
     Z, alone = seats.impedance(omega), P / V * load_transfer(beam, omega / V, omega)
-    return Z * alone / (1.0 + Z * free_rail(beam, seats, omega, omega * seats.pitch / V, 0.0))
+    lag, x, a = omega * seats.pitch / V, np.array(seats.offset), np.array(seats.share)
+    felt = np.tensordot(a, np.cos(np.multiply.outer(x, omega) / V), 1)
+    apart, which = np.unique(np.subtract.outer(x, x).round(12), return_inverse=True)  # some pairs are as far apart
+    weight = np.bincount(which.ravel(), np.outer(a, a).ravel())
+    own = sum(b * free_rail(beam, seats, omega, lag, float(y)) for y, b in zip(apart, weight, strict=True))
+    found: Complexes = Z * alone * felt / (1.0 + Z * own)
+    return found
 
 
 def seat_force(beam: Beam, seats: Seats, V: float, P: float, x: Reals) -> Reals:
@@ -170,7 +185,9 @@ def deflection_under_load(beam: Beam, seats: Seats, V: float, P: float, x: Reals
     beyond = P / (np.pi * (beam.kGA - beam.m * V**2)) * DISTANCE / (np.pi * POINTS)
     found = []
     for place in np.mod(x, seats.pitch):
-        carried = R * free_rail(beam, seats, omega, lag, float(place)) * np.exp(1j * omega * place / V)
+        points = zip(seats.offset, seats.share, strict=True)
+        spread = sum(a * free_rail(beam, seats, omega, lag, place - x) for x, a in points)
+        carried = R * spread * np.exp(1j * omega * place / V)
         found.append(float(np.sum(alone - carried).real) * V / DISTANCE + beyond)
     return np.array(found)
 

@@ -91,7 +91,7 @@ def _resumed(folder: Path) -> None:
 def _blocks(writer: Writer, first: int) -> None:
     for number in range(first, len(SAMPLES)):
         writer.write(0, _block(number))
-        writer.note(0, [Event("wheel_lift", 0.1 * number, 1.0, 1, "left", f"block {number}", False)])
+        writer.add_events(0, [Event("wheel_lift", 0.1 * number, 1.0, 1, "left", f"block {number}", False)])
         writer.commit()
         Checkpoint(0, {"rows": writer.rows(0), "blocks": number + 1}, {"state": np.arange(500.0)}).write(_path(writer))
     writer.describe(0, {"status": "complete"})

@@ -46,7 +46,7 @@ def _signalled(yard: Yard, number: signal.Signals, times: int, send: Callable[[P
     words = f"{number.name} {'twice ' if times > 1 else ''}to {whom}, {yard.run.words}"
     status, said = process.wait(), process.said.strip()
     bad = [] if status == STATUS[number] else [f"exit status {status}, not {STATUS[number]}"]
-    if (times == 1 and not said.endswith(f": tiengine resume {NAME}")) or "Traceback" in said:
+    if (times == 1 and not said.endswith(f"resume with: tiengine resume {NAME}")) or "Traceback" in said:
         bad.append(f"said: {said[-300:]}")
     bad += [f"worker {each.pid} is left" for each in process.workers()] + yard.committed(folder, process)
     again = yard.go_on(folder)

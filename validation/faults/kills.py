@@ -285,9 +285,8 @@ def _kept(left: Contents, noted: Record, reference: Contents, outcome: Outcome) 
 
 
 def _said_complete(process: Process) -> bool:
-    """Whether there was nothing left to resume."""
-    said = process.said.strip()
-    return said.startswith(f"error: {NAME}: ") and said.endswith("is complete; there is nothing to resume")
+    """Whether there was nothing to resume any more."""
+    return process.said.strip() == f"error: {NAME}: the run is complete; there is nothing to resume"
 
 
 def _exists(process: Process, folder: Path) -> bool:

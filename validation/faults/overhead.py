@@ -12,17 +12,18 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import load_scenario, to_toml
-from tiengine.simulation.collector import COMMIT_SHARE, FLUSH_SECONDS, Gathering
+from tiengine.simulation.collector import COMMIT_SHARE, FLUSH_SECONDS, Collector
 from tiengine.simulation.messages import Begun, Saved
+from tiengine.simulation.restart import save
 from tiengine.simulation.simulate import CHECKPOINT_SECONDS, _groups
+from tiengine.simulation.stream import facts_at_start
 from tiengine.simulation.tasks import plan
-from tiengine.simulation.time_loop import Run, _facts
+from tiengine.simulation.time_loop import Run
 
 __all__ = ["Overhead", "overhead"]
 
@@ -64,9 +65,9 @@ def overhead(folder: Path, trains: int, repeats: int) -> Overhead:
     with threadpool_limits(1), Writer(path, to_toml(scenario), {}, [], _groups(scenario)) as writer:
         (task,) = plan(scenario)
         run = Run.begin(task)
-        gathering = Gathering(scenario, writer, path)
-        gathering.take(Begun(0, run.labels, _facts(task, run.model)))
-        measure = _Measure(run, gathering, writer)
+        collector = Collector(scenario, writer, path)
+        collector.take(Begun(0, run.labels, facts_at_start(task, run.stepper.ingredients)))
+        measure = _Measure(run, collector, writer)
         measure.block(3)
         plain, with_one = [], []
         for _ in range(repeats):
@@ -93,23 +94,23 @@ def overhead(folder: Path, trains: int, repeats: int) -> Overhead:
 class _Measure:
     """A run that is advanced a chunk of steps at a time."""
 
-    def __init__(self, run: Run, gathering: Gathering, writer: Writer) -> None:
-        self._run, self._gathering, self._writer = run, gathering, writer
+    def __init__(self, run: Run, collector: Collector, writer: Writer) -> None:
+        self._run, self._collector, self._writer = run, collector, writer
         self._blocks = run.blocks()
 
     def block(self, chunks: int) -> float:
         """Advance and write without a commit."""
         clock = time.perf_counter()
         for _ in range(chunks):
-            self._gathering._committed = clock + 1e9  # none of its own
-            self._gathering.take(next(self._blocks))
+            self._collector._committed = clock + 1e9  # none of its own
+            self._collector.take(next(self._blocks))
         return time.perf_counter() - clock
 
     def checkpoint(self) -> float:
         """Write a checkpoint, as a run does every 60 s."""
         clock = time.perf_counter()
-        saved: Any = self._run.saved(0.0)
-        self._gathering.take(Saved(self._run.task.trains, saved))
+        saved = save(self._run, 0.0)
+        self._collector.take(Saved(self._run.task.trains, saved))
         return time.perf_counter() - clock
 
     def commit_after(self, chunks: int) -> float:

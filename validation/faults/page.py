@@ -192,8 +192,8 @@ def _boundary_words(part: Found) -> list[str]:
 
 def _power_words(part: Found) -> list[str]:
     return [
-        f"{part['deaths']} disks were constructed as a journalling file system may leave them when power fails",
-        "during the same sessions: of each file the content at its last fsync and any part of later writes, in any",
+        f"{part['deaths']} disks were constructed as a journalling file system may leave them when power fails in the",
+        "same sessions: of each file the content at its last fsync and any part of later writes, in any",
         f"order. The file was as of the last commit {part['as_before']} times, as of the one in progress",
         f"{part['as_after']} times, {part['by_journal']} of these with its journal.",
         f"Other states: {len(part['wrong'])}.",

@@ -16,8 +16,7 @@ from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recording.guards import LIMITS
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulation import simulate
-from tiengine.simulation import time_loop as march
+from tiengine.simulation import simulate, time_loop
 from validation.faults.contents import Contents, contents
 from validation.faults.plan import SEED
 from validation.faults.space import Check
@@ -111,31 +110,29 @@ def _growth(block: str, train: int, step: int) -> Change:
 
 @contextmanager
 def _spoiled(change: Change, block: str, train: int, crossed: list[float], dt: float) -> Iterator[None]:
-    """Run with a change of the state at the end of steps, before the guard; record when a limit is exceeded."""
-    begin = march.Run.begin
+    """Runs whose steps end with a change of the state, before the guard looks; notes when a limit is passed."""
+    begin = time_loop.Run.begin
 
     def spoiled(*arguments: Any, **options: Any) -> Any:
         run = begin(*arguments, **options)
         state, stepper = run.stepper.state, run.stepper
 
         def spoil() -> None:
-            done = run.done + stepper.asked[0] + 1
+            done = run.done + stepper.rows.step + 1
             change(state, done)
             if not crossed and not all(
-                bool((np.abs(state.view(row, block)[train]) < limit).all()) for row, limit in LIMITS.items()
+                bool((np.abs(rows) < limit).all()) for rows, limit in zip(state.part(train, block), LIMITS, strict=True)
             ):
                 crossed.append(done * dt)
 
-        *before, guard = stepper.stages
-        assert guard[0] == "guards", guard[0]
-        stepper.stages = (*before, ("faults", spoil), guard)
+        stepper.watch("faults", spoil, before="guards")
         return run
 
-    march.Run.begin = staticmethod(spoiled)  # type: ignore[method-assign]
+    time_loop.Run.begin = staticmethod(spoiled)  # type: ignore[method-assign]
     try:
         yield
     finally:
-        march.Run.begin = begin  # type: ignore[method-assign]
+        time_loop.Run.begin = begin  # type: ignore[method-assign]
 
 
 def _unstable(path: Path, checked: bool) -> Check:

@@ -344,12 +344,12 @@ def implicit_and_contact(
             for side in ti.static(range(2)):
                 rail_under_wheel(w, side, speed, shape_out, rails, rail_free_out)
         for w in range(dims[at.WHEELSETS]):
-            felt = ct.felt_at(0, step, w, irregularity)
+            channels = ct.channels_at(0, step, w, irregularity)
             ct.solve_wheelset(
                 0, w, speed, wheelset_now(w, at.U, wheelset_dof, motion), wheelset_now(w, at.V, wheelset_dof, motion),
-                uw.stored_rail(0, w, 0, rail_free_out), uw.stored_rail(0, w, 1, rail_free_out), felt, dims, constants,
-                wheel, table, wheelset_compliance, rail_compliance_out, contact_out, force_out, wheelset_force_out,
-                rail_force_out, constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD],
+                uw.stored_rail(0, w, 0, rail_free_out), uw.stored_rail(0, w, 1, rail_free_out), channels, dims,
+                constants, wheel, table, wheelset_compliance, rail_compliance_out, contact_out, force_out,
+                wheelset_force_out, rail_force_out, constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD],
             )  # fmt: skip
         keep_increments(wheelset_force_out, rail_force_out, wheelset_before_out, rail_before_out)
         add_wheels(constants, inverse, shape_out, rail_before_out, rails)

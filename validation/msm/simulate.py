@@ -161,7 +161,8 @@ def _loop(
         if not np.isfinite(stepper.state.force).all():
             raise RuntimeError(f"the full-length model ran away before {chainage[-1]:.1f} m; shorten the time step")
         before = time.perf_counter()
-        recorder.append(writer, 0, _samples(track, buffers), np.arange(done + 1, done + count + 1), chainage)
+        steps = np.arange(done + 1, done + count + 1)
+        writer.write(0, recorder.block(_samples(track, buffers), steps, chainage))
         writing += time.perf_counter() - before
         done, position = done + count, float(chainage[-1])
         if progress is not None:

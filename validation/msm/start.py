@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.kernels import layout as at
 from tiengine.model.model import Ingredients, build_model
 from tiengine.parameters.arrays import Reals
@@ -45,8 +45,8 @@ def steady_rolling(track: FullTrack, state: FullState, scenario: Scenario, given
     length = float(np.ptp(given.train.wheelset_x)) + 2.0 * MARGIN
     modes = round(track.modes / track.rail_length * length)
     model = build_model(replace(given, length=length, modes=modes), V)
-    rolling = State.at_rest(model)
-    rear = scenario.rear + scenario.centre_in_window - model.centre_s
+    rolling = SineState.at_rest(model)
+    rear = scenario.rear + scenario.centre_in_window - model.ingredients.centre_s
     equilibrium(model, rolling, rear, V)
     state.motion[: at.A + 1] = [rolling.view(row, "vehicles")[0] for row in (at.U, at.V, at.A)]
     state.contact[:], state.force[:] = rolling.contact, rolling.force

@@ -97,7 +97,7 @@ CASES = (
             source="the source paper; its 44 DOFs per slab do not follow from 18 standard plate elements",
             reference=943,
             why="35 + 2 x 5 x 60 + slabs x (3 x 30 nodes + lateral and yaw)",
-            compute=lambda count=count: paper_model(f'numerics.slab_count="{count}"').dof_counts["total"],
+            compute=lambda count=count: paper_model(f'numerics.slab_count="{count}"').ingredients.dof_counts["total"],
         )
         for count, words in (("paper", "7 slabs as in the paper"), ("cover", "8 slabs, full cover"))
     ),
