@@ -10,7 +10,8 @@ from tiengine.engine import backend
 from tiengine.engine.stability import TOLERATED_GROWTH, energy_growth
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Chunk, Stepper
-from tiengine.irregularity.irregularity import IrregularityParams, check_step, shortest_wavelength
+from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.track_checks import check_step, shortest_wavelength
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
@@ -47,7 +48,7 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     for dt in AUTO_STEPS if asked == "auto" else (float(asked),):
         try:
             check_wavelength(scenario, dt)
-            check_step(shortest, fastest, dt)
+            check_step(scenario.irregularity, shortest, fastest, dt)
         except InputError:
             if asked == "auto" and dt != AUTO_STEPS[-1]:
                 continue

@@ -16,7 +16,8 @@ import numpy as np
 import tomli_w
 from pydantic import Field
 
-from tiengine.irregularity.irregularity import STEPS_PER_WAVE, IrregularityParams
+from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.track_checks import STEPS_PER_WAVE
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path
 from tiengine.parameters.presets import find_preset

@@ -21,7 +21,8 @@ from tiengine.engine.equilibrium import equilibrium, release
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Chunk, Stepper
 from tiengine.engine.time_step import prepare
-from tiengine.irregularity.irregularity import Irregularity, check_reach, make_irregularity
+from tiengine.irregularity.irregularity import Irregularity, make_irregularity
+from tiengine.irregularity.track_checks import check_reach
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 from tiengine.parameters.errors import InputError
@@ -72,7 +73,7 @@ def march(
         yield Lost(task.trains, str(error), refused=True)
         return
     setup = time.perf_counter() - clock - run.jit
-    yield Begun(task.number, run.labels, _facts(task, run.model))
+    yield Begun(task.number, run.labels, _facts(task, run.model, run.tracks))
     before = 0.0 if saved is None else float(saved.facts["loop"])
     clock = last = time.perf_counter()
     try:
@@ -288,7 +289,7 @@ def _started(scenario: Scenario, model: Model) -> State:
     return state
 
 
-def _facts(task: Task, model: Model) -> dict[int, dict[str, Any]]:
+def _facts(task: Task, model: Model, tracks: list[Irregularity]) -> dict[int, dict[str, Any]]:
     """What is known of each train from the beginning."""
     given = model.given
     shared = {
@@ -301,7 +302,12 @@ def _facts(task: Task, model: Model) -> dict[int, dict[str, Any]]:
         "slabs": given.slots,
         "seats_in_window": int(model.dims[at.SEATS]),
     }
-    return {number: {**shared, "seed": task.tracks[b].seed} for b, number in enumerate(task.trains)}
+    facts: dict[int, dict[str, Any]] = {}
+    for b, number in enumerate(task.trains):
+        facts[number] = {**shared, "seed": task.tracks[b].seed}
+        if tracks[b].description:
+            facts[number]["irregularity_file"] = tracks[b].description
+    return facts
 
 
 def _until(blocks: dict[str, Block], time: float) -> dict[str, Block]:
