@@ -18,6 +18,7 @@ from pydantic import Field
 
 from tiengine.irregularity.irregularity import IrregularityParams
 from tiengine.irregularity.track_checks import STEPS_PER_WAVE
+from tiengine.parameters.constants import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path
 from tiengine.parameters.presets import find_preset
@@ -232,6 +233,13 @@ def _check(scenario: Scenario) -> None:
         raise InputError(
             f"train.speed_kmh: {scenario.train.distance:g} m would take up to {duration:.3g} s;"
             f" must be at most {LONGEST_RUN:g} s"
+        )
+    begin = scenario.rear + scenario.centre_in_window
+    adhesion = scenario.train.speed.largest_acceleration(begin, begin + scenario.train.distance) / GRAVITY
+    if scenario.train.effort == "wheels" and adhesion >= scenario.track.friction:
+        raise InputError(
+            f"train.speed_kmh: needs an adhesion of {adhesion:.3g}; must be below track.friction ="
+            f" {scenario.track.friction:g} for wheels that brake or drive (train.effort)"
         )
     zone, widest = scenario.numerics.absorbing_zone, 0.5 * (window - least)
     if zone > widest + 1e-9:
