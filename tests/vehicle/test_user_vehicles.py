@@ -1,4 +1,4 @@
-"""Vehicles as users write them, body by body: a six-axle locomotive, a three-piece wagon with its load off the centre."""
+"""Vehicles as users write them, body by body: a six-axle locomotive, a three-piece wagon loaded off its centre."""
 
 from __future__ import annotations
 
