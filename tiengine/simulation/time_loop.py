@@ -20,7 +20,8 @@ from tiengine.engine.sine_state import SineState
 from tiengine.engine.sine_stepper import SineStepper
 from tiengine.engine.stepper import Stepper
 from tiengine.engine.time_step import prepare
-from tiengine.irregularity.irregularity import Irregularity, check_reach, make_irregularity
+from tiengine.irregularity.irregularity import Irregularity, make_irregularity
+from tiengine.irregularity.track_checks import check_reach
 from tiengine.model.model import Model
 from tiengine.recording.guards import Guard
 from tiengine.recording.recorder import Recorder
