@@ -10,6 +10,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tiengine.irregularity.track_function import TrackFunction as TrackFunction
     from tiengine.parameters.errors import InputError as InputError
     from tiengine.result import Result as Result
     from tiengine.result import open as open
@@ -18,11 +19,12 @@ if TYPE_CHECKING:
     from tiengine.simulation.simulate import run as run
 
 __version__ = metadata.version("tiengine")
-__all__ = ["InputError", "Result", "load_scenario", "open", "resume", "run"]
+__all__ = ["InputError", "Result", "TrackFunction", "load_scenario", "open", "resume", "run"]
 
 _HOMES = {
     "InputError": "tiengine.parameters.errors",
     "Result": "tiengine.result",
+    "TrackFunction": "tiengine.irregularity.track_function",
     "load_scenario": "tiengine.scenario.scenario",
     "open": "tiengine.result",
     "resume": "tiengine.simulation.simulate",

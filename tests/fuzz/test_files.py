@@ -12,8 +12,8 @@ from tiengine.contact.profile import Kind, Profile, load_profile
 from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
 from tiengine.irregularity.measured_files import LARGEST_CHAINAGE, LARGEST_HEIGHT, read_series
 
-from ..fuzzing import DAMAGES, EXAMPLES, Damage, mutated_texts, on_many, refused
 from ..contact.test_profile_files import columns, miniprof, simpack
+from ..fuzzing import DAMAGES, EXAMPLES, Damage, mutated_texts, on_many, refused
 
 KINDS: dict[Kind, str] = {"wheel": "LMA", "rail": "CHN60"}
 WRITERS = {".prw": simpack, ".prr": simpack, ".whl": miniprof, ".ban": miniprof, ".csv": columns}

@@ -92,7 +92,7 @@ def test_reference_knows_unit_range_and_default():
     """Rows read off the declarations by hand: a bound, a number or a word, a list, a nested table, a required part."""
     text = page()
     for row in (
-        "| `distance` | number | m | > 0, ≤ 1e6 | required | way of the train |",
+        "| `distance` | number | m | > 0, ≤ 1e6 | required | distance the train covers |",
         '| `window` | number or `"auto"` | m | 1 to 2000 | `"auto"` |',
         "| `v` | list of numbers | m/s | ≥ 0 | [0] | rates |",
         "| `damping` | number | N s/m^3 | ≥ 0 | required | vertical damping c_m per area |",

@@ -24,7 +24,7 @@ SEAT = {"name": "c", "on": "fastening", "chainage": 20.0, "side": "right"}
 @pytest.mark.parametrize(
     ("gauges", "message"),
     [
-        ([RAIL, RAIL | {"side": "right"}], r"gauges\[1\].name = 'a': gauges\[0\] has this name already"),
+        ([RAIL, RAIL | {"side": "right"}], r"gauges\[1\].name = 'a': gauges\[0\] already has this name"),
         ([RAIL | {"name": "a b"}], r"gauges\[0\].name = 'a b': must be made of letters, digits, _ and -"),
         ([RAIL | {"name": ""}], r"gauges\[0\].name = '': must be made of"),
         ([RAIL | {"name": "../x"}], r"gauges\[0\].name = '../x': must be made of"),
@@ -32,10 +32,10 @@ SEAT = {"name": "c", "on": "fastening", "chainage": 20.0, "side": "right"}
         ([RAIL | {"chainage": -1.0}], r"gauges\[0\].chainage = -1.0: must be greater than or equal to 0 m"),
         ([RAIL | {"chainage": 1e3}], r"gauges\[0\].chainage = 1000: must be between 0 and 38 m"),
         ([RAIL | {"side": None}], r"gauges\[0\].side: missing; a gauge on a rail needs 'left' or 'right'"),
-        ([RAIL | {"y": 0.1}], r"gauges\[0\].y = 0.1: only a gauge on a slab has it"),
+        ([RAIL | {"y": 0.1}], r"gauges\[0\].y = 0.1: only for a gauge on a slab"),
         ([SEAT | {"side": "up"}], r"gauges\[0\].side = 'up': must be 'left' or 'right'"),
         ([SLAB | {"side": "left"}], r"gauges\[0\].side = 'left': a gauge on a slab has y instead"),
-        ([SLAB | {"y": None}], r"gauges\[0\].y: missing; a gauge on a slab needs its place"),
+        ([SLAB | {"y": None}], r"gauges\[0\].y: missing; a gauge on a slab needs its distance"),
         ([SLAB | {"y": 1.3}], r"gauges\[0\].y = 1.3: must be within half the slab's width, 1.25 m"),
         ([SLAB | {"y": float("nan")}], r"gauges\[0\].y = nan: must be a finite number"),
         ([SLAB | {"chainage": 17.02}], r"gauges\[0\].chainage = 17.02: lies in a joint; must be on a slab, number 3"),

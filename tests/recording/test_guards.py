@@ -193,7 +193,7 @@ def test_a_measured_track_that_is_never_reached_is_refused(tmp_path):
     file = tmp_path / "track.csv"
     file.write_text("distance [m],vertical_left [m],vertical_right [m],alignment_left [m],alignment_right [m]\n" + rows)
     with pytest.raises(
-        InputError, match=r"irregularity\.file: begins at chainage 900 m: must be before the end of the way"
+        InputError, match=r"irregularity\.file: begins at chainage 900 m: must be before the end of the run"
     ):
         simulate.run(short(irregularity__file=str(file)), tmp_path / "run.h5")
     assert list(tmp_path.iterdir()) == [file]

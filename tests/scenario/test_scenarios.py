@@ -200,7 +200,7 @@ def test_a_measured_series_limits_the_step(tmp_path):
     file.write_text("x,z_v\n" + "".join(f"{0.05 * i:.2f},0.0\n" for i in range(2000)))
     measured = f"irregularity.file='{file}'"
     assert simulate.prepare(scenario("default", measured))[0].given.newmark.dt == 1e-4
-    with pytest.raises(InputError, match=r"shortest wavelength = 0\.1 m: must be >= 8 V dt = 0\.1556 m"):
+    with pytest.raises(InputError, match=r"shortest wavelength = 0\.1: must be at least 8 V dt = 0\.1556 m"):
         simulate.prepare(scenario("default", measured, "numerics.time_step=2e-4"))
 
 

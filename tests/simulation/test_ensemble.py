@@ -119,7 +119,7 @@ def test_measured_files_are_found_beside_the_scenario(tmp_path):
     ("settings", "message"),
     [
         ({"size": 0}, "ensemble.size = 0: must be greater than or equal to 1"),
-        ({"size": 2, "seeds": [1]}, r"ensemble.seeds = \[1\]: must be one seed a train, 2"),
+        ({"size": 2, "seeds": [1]}, r"ensemble.seeds = \[1\]: must be one seed per train, 2"),
         ({"size": 2, "seeds": [1, -1]}, r"ensemble.seeds\[1\] = -1: must be"),
         ({"size": 2, "vary": {"train.speed_kmh": [300.0] * 3}}, "'train.speed_kmh' has 3 values: must be as many"),
         ({"size": 2, "vary": {"train.speed_kmh": []}}, "'train.speed_kmh' has 0 values"),
@@ -130,8 +130,11 @@ def test_measured_files_are_found_beside_the_scenario(tmp_path):
         ({"size": 2, "vary": {"output.precision": ["single", "double"]}}, "'output.precision' cannot vary"),
         ({"size": 2, "vary": {"ensemble.size": [1, 2]}}, "'ensemble.size' cannot vary"),
         ({"size": 2, "vary": {"numerics.threads": [1, 2]}}, "'numerics.threads' cannot vary"),
-        ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.seed": [1, 2]}}, "'irregularity.seed' cannot vary where"),
-        ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.spectrum": ["none"]}}, "ensemble.seeds: make no differ"),
+        ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.seed": [1, 2]}}, "'irregularity.seed' cannot vary if"),
+        (
+            {"size": 2, "seeds": [1, 2], "vary": {"irregularity.spectrum": ["none"]}},
+            "ensemble.seeds: no effect without",
+        ),
     ],
 )
 def test_bad_input_names_the_train_and_the_key(settings, message):

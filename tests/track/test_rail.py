@@ -172,7 +172,7 @@ def test_energy_of_free_motion() -> None:
 
 
 def test_step_against_host() -> None:
-    """What a step has for C v + K u is that of the sparse matrices; two trains, speed changing.
+    """C v + K u of the step equals that of the sparse matrices; two trains, speed changing.
 
     Rails: the force. Slabs and trains: the acceleration, that is after the implicit operator.
     """

@@ -55,7 +55,7 @@ def test_seats_feel_a_slab_on_all_its_modes_as_on_its_mesh():
     """Compliance of the bedded slab between its seats; 1e-8: eigenvectors of a problem with a spread of 1e8."""
     slab, mortar = load_slab("CRTS_III")
     element = slab.length / slab.elements_x  # a void of whole elements: the engine's Gauss cells blur other edges
-    void = MortarVoid(slab=0, x_from=3 * element, x_to=5 * element, y_from=-slab.width / 2, y_to=slab.width / 2)
+    void = MortarVoid(slab=0, x=(3 * element, 5 * element), y=(-slab.width / 2, slab.width / 2))
     mesh, modal = slab_matrices(slab, mortar, [void]), modal_slab(slab, mortar, [void], ALL)
     m = len(modal.omega)
     for side in range(2):

@@ -10,7 +10,7 @@ from tiengine.engine import backend
 from tiengine.engine.stability import TOLERATED_GROWTH, energy_growth
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Chunk, Stepper
-from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
+from tiengine.irregularity.irregularity import IrregularityParams, check_step, shortest_wavelength
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
@@ -43,11 +43,11 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     V = scenario.train.speed.at(scenario.rear + scenario.centre_in_window)[0]
     fastest = scenario.train.speed.fastest
     jit = 0.0
-    track = make_irregularity(scenario.irregularity, 0.0)  # a measured series has its own shortest wave
+    shortest = shortest_wavelength(scenario.irregularity)
     for dt in AUTO_STEPS if asked == "auto" else (float(asked),):
         try:
             check_wavelength(scenario, dt)
-            track.check_step(fastest, dt)
+            check_step(shortest, fastest, dt)
         except InputError:
             if asked == "auto" and dt != AUTO_STEPS[-1]:
                 continue

@@ -13,7 +13,7 @@ from tiengine.figures.palette import BLACK, ORANGE, PURPLE
 from tiengine.figures.style import LEFT, RIGHT, Look, in_style, new_figure
 from tiengine.indices.extremes import Extremes, read_extremes
 from tiengine.indices.train_record import AbsentError, Train
-from tiengine.parameters.sides import SIDES
+from tiengine.parameters.conventions import SIDES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,8 +80,8 @@ def _line(axes: Axes, extremes: Extremes, values: Any, look: Look, scale: float,
 
 
 def _vertical(axes: Axes, seats: Extremes) -> None:
-    for side, (look, words) in enumerate(zip(LOOKS, SIDES, strict=True)):
-        _line(axes, seats, seats["largest_vertical_force"][:, side], look, 1e-3, label=words)
+    for side, look in enumerate(LOOKS):
+        _line(axes, seats, seats["largest_vertical_force"][:, side], look, 1e-3, label=SIDES[side])
         _line(axes, seats, seats["smallest_vertical_force"][:, side], look, 1e-3, linewidth=0.5)
     axes.axhline(1e-3 * seats.sound_median("largest_vertical_force"), color=BLACK, linewidth=0.7, linestyle=":",
                  label="median of sound seats")  # fmt: skip

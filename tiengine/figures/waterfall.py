@@ -11,7 +11,7 @@ from tiengine.figures.palette import BLACK, SKY
 from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure
 from tiengine.indices.train_record import AbsentError, Train
 from tiengine.parameters.arrays import Reals
-from tiengine.parameters.sides import SIDES
+from tiengine.parameters.conventions import SIDES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

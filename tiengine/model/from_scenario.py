@@ -62,7 +62,7 @@ def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64
 def _designs(scenario: Scenario) -> SlabDesigns:
     """One design for each slab that has a void or a failed fastening, besides the sound one."""
     parts, track = scenario.parts, scenario.track
-    voids = scenario.mortar_voids
+    voids = track.mortar_voids
     matrices, of_void = slab_designs(parts.slab, parts.mortar, voids)
     per_slab = parts.slab.fastenings
     damaged = set(of_void)

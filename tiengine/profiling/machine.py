@@ -70,7 +70,8 @@ def versions() -> dict[str, str]:
 
 def import_seconds() -> float:
     """Wall time of importing what a run needs, in a fresh interpreter [s]; call it before Taichi begins."""
-    script = "import time; clock = time.perf_counter(); import tiengine.simulation.simulate; print(time.perf_counter() - clock)"
+    load = "import tiengine.simulation.simulate"
+    script = f"import time; clock = time.perf_counter(); {load}; print(time.perf_counter() - clock)"
     output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
     return float(output.split()[-1])
 

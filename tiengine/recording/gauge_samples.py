@@ -21,7 +21,7 @@ from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 from tiengine.parameters.arrays import Reals
-from tiengine.parameters.sides import SIDES
+from tiengine.parameters.conventions import SIDES
 from tiengine.recording.seat_envelopes import watched_seats
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION
 from tiengine.result_files.layout import Block

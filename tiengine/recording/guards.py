@@ -15,7 +15,7 @@ from tiengine.contact.table import ContactTable
 from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import SHIFT
-from tiengine.parameters.sides import SIDES
+from tiengine.parameters.conventions import SIDES
 from tiengine.result_files.channels import DOFS
 from tiengine.result_files.events import EVENT_KINDS, Event
 from tiengine.scenario.event_policy import Events

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.parameters.arrays import Reals
-from tiengine.parameters.sides import SIDES
+from tiengine.parameters.conventions import SIDES
 from tiengine.result_files.channels import DIRECTIONS, DOFS, GAUGE_FORCE, GAUGE_MOTION, GROUPS, Channel
 
 __all__ = [

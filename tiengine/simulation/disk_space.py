@@ -7,8 +7,8 @@ import shutil
 from pathlib import Path
 
 from tiengine.model.model import slot_count
+from tiengine.parameters.conventions import SIDES
 from tiengine.parameters.errors import InputError
-from tiengine.parameters.sides import SIDES
 from tiengine.recording.deflection import window_points
 from tiengine.recording.recorder import Recorder
 from tiengine.recording.trackside import trackside_groups

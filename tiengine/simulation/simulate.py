@@ -13,6 +13,7 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from tiengine.engine.time_step import AUTO_STEPS, prepare
+from tiengine.irregularity.track_function import TrackFunction, TrackFunctions, recorded_name, track_functions
 from tiengine.parameters.errors import InputError, RunFailedError, RunStoppedError
 from tiengine.recording.recorder import Recorder
 from tiengine.recording.trackside import trackside_groups
@@ -50,6 +51,7 @@ def run(
     checkpoint: float = CHECKPOINT_SECONDS,
     stop: Callable[[], bool] = never,
     public_launch: bool = False,
+    irregularity: TrackFunctions | None = None,
 ) -> Result:
     """Simulate a scenario: one train, or the trains of its ensemble.
 
@@ -67,6 +69,10 @@ def run(
         checkpoint: Wall time between two checkpoints [s], from which :func:`resume` goes on.
         stop: Asked now and then; if true, the chunk of steps is finished, saved, and left.
         public_launch: Launch kernels by public Taichi calls only (slower; for comparison).
+        irregularity: Function of chainage (or a :class:`TrackFunction`) that replaces the irregularity's spectrum or
+            file; for an ensemble one for all trains, or one for each. Rail roughness, ``scale`` and ``taper`` apply to
+            it as well. The time step is not checked against its wavelengths. Worker processes need a function that
+            can be pickled. The file records its name; :func:`resume` must be given it again.
 
     Returns:
         The result, open for reading. Trains of an ensemble that failed are in ``result.failures``.
@@ -77,14 +83,20 @@ def run(
         RunStoppedError: It was asked to stop; the file holds what was computed until then and can be resumed.
     """
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    functions: tuple[TrackFunction, ...] = ()
+    if irregularity is not None:
+        functions = track_functions(irregularity, len(scenario.members))
+        scenario = load_scenario(scenario, {"irregularity.function": recorded_name(functions)})
+    tasks = plan(scenario, functions=functions)
     path = None if output is None else Path(output)
     if path is not None:
         check_output(path, force)
         check_space(scenario, path)
     job = _Job(scenario, path, workers, checkpoint, stop, public_launch)
+    job.check(tasks)
     groups = _groups(scenario)
     with Writer(path, to_toml(scenario), {}, [], groups, scenario.output.precision, force=force) as writer:
-        return job.do(writer, Gathering(scenario, writer, path, progress, tell), plan(scenario))
+        return job.do(writer, Gathering(scenario, writer, path, progress, tell), tasks)
 
 
 def resume(
@@ -95,6 +107,7 @@ def resume(
     workers: int | None = None,
     checkpoint: float = CHECKPOINT_SECONDS,
     stop: Callable[[], bool] = never,
+    irregularity: TrackFunctions | None = None,
 ) -> Result:
     """Go on with a run that was stopped, killed, or out of disk; trains get the same bits as without a break.
 
@@ -105,6 +118,7 @@ def resume(
         workers: See :func:`run`; may be another number than before.
         checkpoint: See :func:`run`.
         stop: See :func:`run`.
+        irregularity: Function of chainage, needed if the run was given one.
 
     Returns:
         The result, open for reading.
@@ -117,7 +131,10 @@ def resume(
     path = Path(file)
     with open_result(path) as result:
         scenario = result.scenario
+    functions = () if irregularity is None else track_functions(irregularity, len(scenario.members))
+    tasks = plan(scenario, functions=functions)
     job = _Job(scenario, path, workers, checkpoint, stop, False)
+    job.check(tasks)
     with Writer.resume(path, _groups(scenario), scenario.output.precision) as writer:
         gathering = Gathering(scenario, writer, path, progress, tell)
         saved = {each.task: each for each in map(Checkpoint.read, checkpoint_paths(path))}
@@ -125,7 +142,6 @@ def resume(
             each.check(str(checkpoint_path(path, each.task)))
             if each.foreign and tell is not None:
                 tell(f"made with {', '.join(each.foreign)}: the bits may differ from those of one run")
-        tasks = plan(scenario)
         gathering.go_on(saved, job.count(tasks))
         return job.do(writer, gathering, [task for task in tasks if not gathering.ended.issuperset(task.trains)])
 
@@ -148,6 +164,17 @@ class _Job:
     def count(self, tasks: Sequence[Task]) -> int:
         """Worker processes for some tasks."""
         return min(_workers(self.scenario) if self.workers is None else self.workers, len(tasks))
+
+    def check(self, tasks: Sequence[Task]) -> None:
+        """Refuse functions of chainage that cannot be sent to worker processes.
+
+        Raises:
+            InputError: One cannot be pickled.
+        """
+        if self.count(tasks) > 1:
+            for task in tasks:
+                for function in task.functions:
+                    function.check_picklable()
 
     def do(self, writer: Writer, gathering: Gathering, tasks: Sequence[Task]) -> Result:
         """Run tasks into a file and complete it."""

@@ -11,6 +11,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -74,15 +75,19 @@ def march(
     yield Begun(task.number, run.labels, _facts(task, run.model))
     before = 0.0 if saved is None else float(saved.facts["loop"])
     clock = last = time.perf_counter()
-    for advanced in run.blocks():
-        yield advanced
-        now, asked = time.perf_counter(), stop()
-        if run.on_its_way and (asked or now - last >= every):
-            yield Saved(task.trains, run.saved(before + now - clock))
-            last = time.perf_counter()
-            if asked:
-                yield Paused(task.trains)
-                return
+    try:
+        for advanced in run.blocks():
+            yield advanced
+            now, asked = time.perf_counter(), stop()
+            if run.on_its_way and (asked or now - last >= every):
+                yield Saved(task.trains, run.saved(before + now - clock))
+                last = time.perf_counter()
+                if asked:
+                    yield Paused(task.trains)
+                    return
+    except InputError as error:  # of a user's function of chainage
+        yield Lost(task.trains, str(error), refused=True)
+        return
     loop = before + time.perf_counter() - clock
     yield Ended(task.number, run.ends(loop), Costs(os.getpid(), run.jit, setup, loop, peak_memory()))
 
@@ -139,7 +144,7 @@ class Run:
         jit += stepper.compile()
         trackside = Trackside.beside(scenario, stepper)
         lead = scenario.rear + float(model.wheel_s.max())
-        tracks = [make_irregularity(track, lead) for track in task.tracks]
+        tracks = [make_irregularity(track, lead, f) for track, f in zip_longest(task.tracks, task.functions)]
         start = scenario.rear + model.centre_s
         check_reach(tracks, start + scenario.train.distance + float(model.given.train.wheelset_x.max()))
         guard = Guard.beside(stepper, scenario.events, np.array([track.end for track in tracks]))

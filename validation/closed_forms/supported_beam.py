@@ -28,11 +28,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tiengine.parameters.arrays import Reals
+from tiengine.parameters.conventions import GRAVITY
 from validation.closed_forms.timoshenko import Beam, pinned_frequencies
 
 __all__ = ["Crossing", "force_euler", "force_timoshenko", "moving_mass", "sprung_mass"]
 
-GRAVITY = 9.81  # m/s^2
 RTOL = 1e-7  # of the integration, a hundred times finer than what it judges
 
 

@@ -229,7 +229,7 @@ def _slab_groups(
 ) -> tuple[SlabGroup, ...]:
     """The sound slabs, then each slab that has a void or a fastening that is not sound."""
     slabs = scale.shape[1]
-    voids = {i: [v for v in scenario.mortar_voids if v.slab == first_slab + i] for i in range(slabs)}
+    voids = {i: [v for v in scenario.track.mortar_voids if v.slab == first_slab + i] for i in range(slabs)}
     odd = [i for i in range(slabs) if voids[i] or (scale[:, i] != 1.0).any()]
     sound = modal_slab(given.slab, given.mortar, [], slab_modes)
     even = np.setdiff1d(np.arange(slabs), odd)

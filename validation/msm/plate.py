@@ -165,8 +165,8 @@ def _lost(slab: Slab, mesh: _Mesh, ex: int, ey: int, voids: Sequence[MortarVoid]
     lost = np.zeros((12, 12))
     cx, cy = (2 * ex + 1) * mesh.a, (2 * ey + 1) * mesh.b - slab.width / 2.0
     for void in voids:
-        left, right = max(void.x_from - cx, -mesh.a), min(void.x_to - cx, mesh.a)
-        low, high = max(void.y_from - cy, -mesh.b), min(void.y_to - cy, mesh.b)
+        left, right = max(void.x[0] - cx, -mesh.a), min(void.x[1] - cx, mesh.a)
+        low, high = max(void.y[0] - cy, -mesh.b), min(void.y[1] - cy, mesh.b)
         if right > left and high > low:
             x, y, weight = _box(left, right, low, high)
             w = _shapes(mesh, x, y)[0]
@@ -207,7 +207,7 @@ def _bed_points(slab: Slab) -> tuple[Reals, Reals]:
 def _factor(slab: Slab, voids: Sequence[MortarVoid], x: float, y: float) -> float:
     """Bed factor at a place from the slab's centre."""
     along = x + slab.length / 2.0
-    inside = [v.factor for v in voids if v.x_from <= along <= v.x_to and v.y_from <= y <= v.y_to]
+    inside = [v.factor for v in voids if v.x[0] <= along <= v.x[1] and v.y[0] <= y <= v.y[1]]
     return inside[0] if inside else 1.0
 
 
@@ -221,5 +221,5 @@ def _lateral_bed(slab: Slab, voids: Sequence[MortarVoid]) -> Reals:
     half = slab.length / 2.0
     total = moments(-half, half, slab.width)
     for void in voids:
-        total -= (1.0 - void.factor) * moments(void.x_from - half, void.x_to - half, void.y_to - void.y_from)
+        total -= (1.0 - void.factor) * moments(void.x[0] - half, void.x[1] - half, void.y[1] - void.y[0])
     return total

@@ -19,7 +19,7 @@ from validation.speed.runs import CASES, Facts, median_of
 __all__ = ["command"]
 
 PARTS = ("import", "jit", "setup", "loop", "writing")
-ENTRY = "from tiengine.cli import main; main()"  # what the installed script does, wherever it is installed
+ENTRY = "from tiengine.cli.commands import main; main()"  # what the installed script does, wherever it is installed
 CACHE = "TI_OFFLINE_CACHE_FILE_PATH"  # Taichi's own variable for the folder of its cache
 
 
