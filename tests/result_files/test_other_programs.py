@@ -18,7 +18,6 @@ from tiengine.result_files.export import MAT_KEYWORDS, export
 from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
 from tiengine.result_files.writer import Writer
 
-WINDOW_POINTS = 9
 LABELS = TrainLabels(
     ["coach"], ["car", "frame 1"], np.zeros(4, np.int64), np.array([10.0, 7.5, -7.5, -10.0]), 3, np.arange(9.0)
 )
@@ -35,7 +34,7 @@ GROUPS = {
     "gauges/1-b": GroupSpec.gauge("force", {"on": "fastening", "chainage": 4.1, "side": "left"}),
 }
 ROWS = {"wheel": 40, "irregularity": 40, "body": 20, "mortar": 20, "seats": 30, "slabs": 5, "deflection": 4}
-LENGTHS = {"wheelset": 4, "side": 2, "body": 2, "dof": 5, "slot": 3, "point": WINDOW_POINTS, "direction": 2}
+LENGTHS = {"wheelset": 4, "side": 2, "body": 2, "dof": 5, "slot": 3, "point": 9, "direction": 2}
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +134,7 @@ def test_netcdf_library(path: Path) -> None:
 
 
 def is_matlab_name(name: str) -> bool:
-    """MATLAB's rule for variables and fields: a letter, then letters, digits and underscores, 63 at most, not reserved."""
+    """Rule of MATLAB: a letter, then letters, digits and underscores, at most 63 characters, no reserved word."""
     return re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,62}", name) is not None and name not in MAT_KEYWORDS
 
 

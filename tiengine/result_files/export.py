@@ -30,10 +30,10 @@ CSV_VALUES = 100_000  # values in memory at once: 13 MB as strings
 PARQUET_VALUES = 1_000_000  # values in a row group: at most 8 MB
 MAT_BYTES = 2**31 - 1  # limit of a file of version 5
 MAT_NAME = 63  # characters of the longest name in MATLAB
-MAT_KEYWORDS = frozenset(
-    "break case catch classdef continue else elseif end for function global if otherwise parfor persistent return spmd"
-    " switch try while".split()
-)
+MAT_KEYWORDS = frozenset({
+    "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if",
+    "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
+})  # fmt: skip
 """Reserved words of MATLAB: no name may be one of them."""
 
 

@@ -10,8 +10,8 @@
 
 Every group holds its own coordinates as dimension scales: ``time`` [s], ``position`` [m] (chainage of the first
 vehicle's centre) and its labels; ``seats`` and ``slabs`` have their index and ``chainage`` [m] instead. Groups sampled
-together share ``time`` and ``position`` by hard links. No coordinate stands above the groups: readers of trees, such as
-``xarray.open_datatree``, would require the groups below to have the same one. Times and chainages are float64, channels float32 or float64.
+together share ``time`` and ``position`` by hard links. No coordinate stands above these groups: in a
+tree of xarray, the groups below would have to share it. Times and chainages are float64, channels float32 or float64.
 
 The root attribute ``status`` is "running" until the run has ended.
 """
