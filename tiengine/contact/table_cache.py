@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 from platformdirs import user_cache_path
 
-from tiengine.contact import hertz, kalker, profile, profile_frame
+from tiengine.contact import hertz, kalker, profile, smoothing
 from tiengine.contact import search as contact_search
 from tiengine.contact import table as contact_geometry
 from tiengine.contact.profile import Profile
@@ -28,7 +28,7 @@ __all__ = ["contact_table"]
 
 FOLDER = "TIENGINE_CACHE"
 """Environment variable that overrides the cache folder."""
-MODULES: tuple[ModuleType, ...] = (contact_geometry, contact_search, hertz, kalker, profile, profile_frame)
+MODULES: tuple[ModuleType, ...] = (contact_geometry, contact_search, hertz, kalker, profile, smoothing)
 FIELDS = ("u_min", "du", "alpha_min", "dalpha", "crown_offset")
 
 
