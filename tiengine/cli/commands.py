@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -120,6 +120,13 @@ def profile(
 @click.option("--allow-kinks", is_flag=True, help="Accept kinks where wheel and rail can touch.")
 @click.option("--mirror-rail/--no-mirror-rail", default=None, help="The rail's gauge face is at positive y, or not.")
 @click.option("--smoothing", type=click.FloatRange(0.0, 5e-3), help="Of points; 0.0005 for measured profiles [m].")
+@click.option(
+    "--method",
+    type=click.Choice(["harmonic", "en15302"]),
+    default="harmonic",
+    show_default=True,
+    help="Equivalent conicity by harmonic linearisation, or by the integral of EN 15302 (without roll).",
+)
 @click.option("--largest", type=float, default=0.008, show_default=True, help="Largest shift [m].")
 def contact(
     wheel: str,
@@ -132,6 +139,7 @@ def contact(
     mirror_rail: bool | None,
     smoothing: float | None,
     largest: float,
+    method: Literal["harmonic", "en15302"],
     **placement: float,
 ) -> None:
     """Show how WHEEL and RAIL, presets or files, touch: rolling radii, conicity, points of contact."""
@@ -152,6 +160,7 @@ def contact(
         load_profile(rail, "rail", smoothing=length, has_cant=canted, mirror=mirror_rail, allow_kinks=allow_kinks),
         build(ContactSettings, placement, "contact"),
         largest,
+        method,
     )
     if output is not None:
         draw(report, output)

@@ -132,7 +132,9 @@ def build_parts(train: Train, track: Track, presets: Presets) -> Parts:
     slab_table = tables["track.slab"]
     mortar_table = slab_table.pop("mortar", None)
     if not isinstance(mortar_table, dict):
-        raise InputError("track.slab.mortar: missing; a table of the bed's properties is required")
+        raise InputError(
+            "track.slab.mortar: missing; a table of the bed's properties is required, or like = the name of a preset"
+        )
     mortar = build(Mortar, mortar_table, "track.slab.mortar")
     if track.mortar_no_tension:
         mortar = mortar.model_copy(update={"no_tension": True})
