@@ -64,7 +64,7 @@ class ContactSettings(Params):
         float,
         Q("m", "step in u; at 0.05 mm the slope of g misses tan gamma by 0.5 % at the flange root", gt=0, le=5e-5),
     ] = 0.025e-3
-    alpha_max: Annotated[float, Q("rad", "largest tilt", gt=0, le=0.1)] = 6e-3
+    alpha_max: Annotated[float, Q("rad", "largest tilt; a wheel on its flange rolls the wheelset by up to 10 mrad", gt=0, le=0.1)] = 12e-3
     dalpha: Annotated[float, Q("rad", "step in alpha", gt=0)] = 0.25e-3
 
     def axis(self, axis: Literal["u", "alpha"]) -> Reals:
