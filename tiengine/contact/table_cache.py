@@ -17,7 +17,7 @@ from zipfile import BadZipFile
 import numpy as np
 import scipy
 
-from tiengine.contact import hertz, kalker, profile, profile_frame
+from tiengine.contact import hertz, kalker, profile, smoothing
 from tiengine.contact import search as contact_search
 from tiengine.contact import table as contact_geometry
 from tiengine.contact.profile import Profile
@@ -26,7 +26,7 @@ from tiengine.parameters.cache_folders import table_folder
 
 __all__ = ["contact_table"]
 
-MODULES: tuple[ModuleType, ...] = (contact_geometry, contact_search, hertz, kalker, profile, profile_frame)
+MODULES: tuple[ModuleType, ...] = (contact_geometry, contact_search, hertz, kalker, profile, smoothing)
 FIELDS = ("u_min", "du", "alpha_min", "dalpha", "crown_offset")
 
 

@@ -118,7 +118,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
         path = find_preset("scenarios", str(source), called="scenario")
         folder, tables = path.parent, load_toml(path)
         tables.setdefault("name", path.stem)
-    tables = _absolute(apply_overrides(tables, overrides), folder)
+    tables = _absolute(apply_overrides(tables, overrides, Scenario), folder)
     scenario = build(Scenario, tables)
     ensemble = _absolute_vary(scenario.ensemble, folder)
     presets = collect_presets(scenario.train, scenario.track, scenario.presets, folder)
@@ -135,7 +135,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
 def _changed(tables: dict[str, Any], ensemble: Ensemble, train: int) -> Scenario:
     """Scenario of one train, from the tables of the ensemble."""
     try:
-        return build(Scenario, apply_overrides({**tables, "ensemble": {}}, ensemble.changes(train)))
+        return build(Scenario, apply_overrides({**tables, "ensemble": {}}, ensemble.changes(train), Scenario))
     except InputError as error:
         raise InputError(f"train {train} of the ensemble: {error}") from None
 

@@ -93,7 +93,7 @@ def run(
     if path is not None:
         check_output(path, force)
         check_space(scenario, path)
-    ensure_cache_folders(tell)
+    ensure_cache_folders(notify)
     job = _Job(scenario, path, workers, checkpoint, stop, public_launch)
     job.check(tasks)
     groups = _groups(scenario)
@@ -133,7 +133,7 @@ def resume(
     path = Path(file)
     with open_result(path) as result:
         scenario = result.scenario
-    ensure_cache_folders(tell)
+    ensure_cache_folders(notify)
     functions = () if irregularity is None else track_functions(irregularity, len(scenario.members))
     tasks = plan(scenario, functions=functions)
     job = _Job(scenario, path, workers, checkpoint, stop, False)
