@@ -29,6 +29,7 @@ __all__ = [
     "SeriesSprings",
     "Spring",
     "Stop",
+    "VehicleClass",
     "check_damper",
     "check_stop",
     "end_motion",
@@ -43,6 +44,10 @@ RollStiffness = Annotated[float, Q("N m/rad", ge=0)]
 Forces = tuple[Annotated[float, Q("N", ge=0)], ...]
 Direction = Literal["x", "y", "z"]
 SeriesSprings = Annotated[bool, Field(description="springs in series with dampers (k_series) get states of their own")]
+
+
+VehicleClass = Literal["coach", "locomotive", "freight"]
+"""Classes of vehicles for which the standards set different limits; multiple units count as coaches."""
 
 
 class Body(Params):
