@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
+from tiengine.cli.reading import CLASSES
+from tiengine.vehicle.connector import VehicleClass
 from tiengine.vehicle.running_gear import cars, running_gears
 from tiengine.vehicle.vehicle import Vehicle, load_vehicle, vehicle_from_table, vehicle_names
 
@@ -18,7 +21,17 @@ def body(name: str, mass: float, x: float, **more: object) -> dict:
 
 
 def spring(a: str, b: str, x: float) -> dict:
-    return {"a": a, "b": b, "point_a": (x, 0.0, 1.0), "point_b": (x, 0.0, 1.0), "kz": 1e6}
+    bending = dict.fromkeys(("k_roll", "k_pitch", "k_yaw"), 1e6)
+    return {
+        "a": a,
+        "b": b,
+        "point_a": (x, 0.0, 1.0),
+        "point_b": (x, 0.0, 1.0),
+        "kx": 1e7,
+        "ky": 1e6,
+        "kz": 1e6,
+        **bending,
+    }
 
 
 def vehicle(bodies: list[dict], springs: list[dict]) -> Vehicle:
@@ -27,7 +40,7 @@ def vehicle(bodies: list[dict], springs: list[dict]) -> Vehicle:
 
 
 def articulated() -> Vehicle:
-    """Two cars of 22 m that share the middle one of three bogies, the rear one lighter; a transformer hangs below it."""
+    """Two cars of 22 m that share the middle one of three bogies; a transformer hangs below the rear one."""
     bogies = {"f1": 19.0, "f2": 0.0, "f3": -19.0}
     bodies = [body("front car", 26e3, 9.5), body("rear car", 22e3, -9.5), body("transformer", 9e3, -9.5)]
     springs = [spring("front car", "f1", 19.0), spring("front car", "f2", 0.3), spring("rear car", "f2", -0.3)]
@@ -66,6 +79,11 @@ def test_two_axle_wagon():
     bodies = [body("car", 30e3, 0.0), *(body(f"w{x}", 1200.0, x, wheelset=True) for x in (4.0, -4.0))]
     (car,) = cars(vehicle(bodies, [spring("car", f"w{x}", x) for x in (4.0, -4.0)]))
     assert [gear.axles for gear in car.gears] == [(4.0,), (-4.0,)]
+
+
+def test_classes_of_the_command_line():
+    """Written out there, since the vehicle takes half a second to import."""
+    assert get_args(VehicleClass) == CLASSES
 
 
 def test_wheelsets_alone_have_no_car():
