@@ -127,7 +127,7 @@ def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
 
 def _wheelset_indices(ride: Ride, vehicle: int, wheelset: int) -> Iterator[Index]:
     forces, speed, vehicle_class = ride.forces(wheelset), ride.speed, ride.vehicle_classes[vehicle]
-    reason = shortfall(_length(forces.position), speed)
+    reason = _shortfall(ride, forces.position)
 
     def index(name: str, place: str, value: float, unit: str, limit: float | None, clause: str) -> Index:
         place = f"wheelset {wheelset + 1}{place}"
@@ -178,11 +178,12 @@ def _acceleration_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Dir
         unit="m/s^2",
         limit=limit,
         clause="7.5.4 ride characteristics",
-        shortfall=shortfall(_length(position), ride.speed),
+        shortfall=_shortfall(ride, position),
         note=note,
     )
 
 
-def _length(position: Reals) -> float:
-    """Distance from the first to the last chainage [m]."""
-    return float(position[-1] - position[0]) if len(position) else 0.0
+def _shortfall(ride: Ride, position: Reals) -> str:
+    """Shortfall of the run, or of the chainages that the settling of filters leaves of it [m], shape (n,)."""
+    used = float(position[-1] - position[0]) if len(position) else 0.0
+    return shortfall(ride.distance, ride.speed) or shortfall(used, ride.speed)
