@@ -1,1 +1,1 @@
-"""Taichi CPU kernels: what moves or is nonlinear. They import no host code."""
+"""Taichi CPU kernels of moving and nonlinear parts. They import no host code."""

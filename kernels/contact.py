@@ -1,16 +1,16 @@
 """Contact of all wheels of all trains, solved against its end-of-step compliance.
 
-At the end of a step the coordinates a wheel feels are x = x_free + S q with q the contact's generalised forces, because
-the rest of the step is linear: S = beta dt^2 A^-1 for displacements, gamma dt A^-1 for rates. Wheels stand still in
-the window, so S is constant. The wheels of one wheelset are solved together; all the others enter x_free with the
-forces they have by then. Newton's method finds the forces f = (N, Fx, Fy) of both wheels of a wheelset with
+At the end of a step the coordinates of a wheel and its rail are x = x_free + S q with q the contact's generalised
+forces, because the other parts of the step are linear: S = beta dt^2 A^-1 for displacements, gamma dt A^-1 for rates.
+Wheels stand still in the window, so S is constant. The wheels of one wheelset are solved together; all the others enter
+x_free with their latest forces. Newton's method finds the forces f = (N, Fx, Fy) of both wheels of a wheelset with
 
     f = law(e),  e = (delta, creepages)(x_free + S B f)
 
-The Jacobian is I - D W with D = d law / d e and W = H S B; it leaves out how the geometry changes along the step, which
-the residual does not. A step that does not bring the forces nearer to the law is halved: at low speed saturating
-creepage would otherwise send the iterates to and fro. The steps shrink by a nearly constant factor, so that the last
-one times the last factor is what is left, and the iteration ends when that is small enough.
+The Jacobian is I - D W with D = d law / d e and W = H S B; it neglects the change of the geometry along the step, which
+the residual includes. A step that does not bring the forces nearer to the law is halved: at low speed saturating
+creepage would otherwise make the iterates oscillate. The steps shrink by a nearly constant factor, so that the last
+one times the last factor estimates the remaining error, and the iteration ends when that is small enough.
 """
 
 import taichi as ti
@@ -21,33 +21,35 @@ from tiengine.kernels import wheel_rail as wr
 from tiengine.kernels.types import Array, Reals1, Reals2, Reals3, Reals4, Template
 
 ITERATIONS = 50
-SMALLEST_SHARE = 1.0 / 128.0  # of a Newton step: below it the step is taken as it is
+SMALLEST_SHARE = 1.0 / 128.0  # of a Newton step: it is not halved further
 ITERATE_TOLERANCE = 0.02
-"""Of the static load, in all passes but the last: so small a Newton step leaves a hundredth of itself, and a pass takes
-that down tenfold. One iteration a wheelset does then, as a rule."""
+"""Tolerance over the static load, in all passes but the last: a Newton step of this size leaves about a hundredth of
+itself, and a pass reduces that tenfold. One iteration per wheelset is then usually enough."""
 
 
 @ti.func
-def solve6(matrix: Template, rhs: Template):
-    """Gaussian elimination with the pivots on the diagonal: the matrix is the identity plus a dissipative part."""
+def solve6(matrix_out: Template, x_out: Template):
+    """Gaussian elimination with the pivots on the diagonal: the matrix is the identity plus a dissipative part.
+
+    ``x_out`` holds the right-hand side before and the solution after; the matrix is overwritten.
+    """
     for k in range(6):
-        inverse = 1.0 / matrix[k, k]
+        inverse = 1.0 / matrix_out[k, k]
         for i in range(k + 1, 6):
-            factor = matrix[i, k] * inverse
+            factor = matrix_out[i, k] * inverse
             for j in range(k + 1, 6):
-                matrix[i, j] -= factor * matrix[k, j]
-            rhs[i] -= factor * rhs[k]
+                matrix_out[i, j] -= factor * matrix_out[k, j]
+            x_out[i] -= factor * x_out[k]
     for m in range(6):
         k = 5 - m
         for j in range(k + 1, 6):
-            rhs[k] -= matrix[k, j] * rhs[j]
-        rhs[k] /= matrix[k, k]
-    return rhs
+            x_out[k] -= matrix_out[k, j] * x_out[j]
+        x_out[k] /= matrix_out[k, k]
 
 
 @ti.func
 def stored_place(b: int, wheelset: int, side: Template, contact: Array):
-    """Contact geometry of a wheel as the last evaluation left it."""
+    """Contact geometry of a wheel from the last evaluation."""
     place = ti.Vector.zero(ti.f64, 5)
     for m in ti.static(range(5)):
         place[m] = contact[b, wheelset, side, wr.SIN + m]
@@ -65,7 +67,7 @@ def stored_force(b: int, wheelset: int, side: Template, count: Template, force: 
 
 @ti.func
 def store_state(b: int, wheelset: int, side: Template, state: Template, contact_out: Array):
-    """Leave a wheel's contact state in memory."""
+    """Store a wheel's contact state."""
     for m in ti.static(range(wr.N_CONTACT)):
         contact_out[b, wheelset, side, m] = state[m]
 
@@ -74,7 +76,7 @@ def store_state(b: int, wheelset: int, side: Template, state: Template, contact_
 def store_force(
     b: int, wheelset: int, side: Template, f: Template, r: Template, force_out: Array, rail_force_out: Array
 ):
-    """Leave a wheel's local forces and its forces on the rail in memory."""
+    """Store a wheel's local forces and its forces on the rail."""
     for m in ti.static(range(4)):
         force_out[b, wheelset, side, m] = f[m]
     for m in ti.static(range(3)):
@@ -85,7 +87,7 @@ def store_force(
 def rail_at_end(wheelset: int, free: Template, force: Template, before: Template, constants: Array, coupling: Array):
     """Rail motion under a wheel at the end of the step, from that without the change of the wheel's force.
 
-    The modes left out answer to the whole force at once, without inertia; that they have rates is neglected.
+    The truncated modes respond to the whole force at once, without inertia; their rates are neglected.
     """
     increment = force - before
     r = free
@@ -129,7 +131,7 @@ def feedback(
     same: Template, wheelset: int, V: float, constants: Array, D: Template, B: Template, R: Template,
     other: Template, cos: float, wheelset_compliance: Array, rail_coupling: Array,
 ):  # fmt: skip
-    """D W for (N, Fx, Fy): what the law of one wheel answers to unit forces of itself (``same``) or of the other wheel.
+    """D W for (N, Fx, Fy): response of the law of one wheel to unit forces of itself (``same``) or of the other wheel.
 
     W is the change of (delta, xi_x, xi_y). N and Fy move y, z and roll; Fx moves pitch and yaw, and yaw steers:
     -psi / cos gamma. The diagonal of the wheelset's compliance is enough, inertia dominates it.
@@ -183,16 +185,18 @@ def newton_step(
             J[m, 3 + n] -= lr[m, n]
             J[3 + m, n] -= rl[m, n]
             J[3 + m, 3 + n] -= rr[m, n]
-    return solve6(J, residual)
+    step = residual
+    solve6(J, step)
+    return step
 
 
 @ti.func
-def felt_at(b: int, step: int, wheelset: int, irregularity: Array):
+def channels_at(b: int, step: int, wheelset: int, irregularity: Array):
     """Track channels under a wheelset in a step."""
-    felt = ti.Vector.zero(ti.f64, at.N_IRREGULARITY)
+    channels = ti.Vector.zero(ti.f64, at.N_IRREGULARITY)
     for m in ti.static(range(at.N_IRREGULARITY)):
-        felt[m] = irregularity[b, step, wheelset, m]
-    return felt
+        channels[m] = irregularity[b, step, wheelset, m]
+    return channels
 
 
 @ti.func
@@ -204,10 +208,10 @@ def solve_wheelset(
     """Newton's method for the local forces of one wheelset, to a tolerance [N]; returns the number of iterations.
 
     Unknowns are N, Fx, Fy of both wheels; the small spin moments follow the law from one iteration to the next. The
-    free motions of wheelset and rails (left, right) hold what the forces found here before would do.
+    free motions of wheelset and rails (left, right) include the response to the forces stored before.
 
-    Everything that changes from one iteration to the next is local: Taichi 1.7.4 takes a load with a literal index
-    and a store with a running one for different places and moves the load out of the loop.
+    Everything that changes from one iteration to the next is local: Taichi 1.7.4 treats a load with a literal index
+    and a store with a loop index as different places and moves the load out of the loop.
     """
     before_l, before_r = stored_force(b, wheelset, 0, 3, rail_force), stored_force(b, wheelset, 1, 3, rail_force)
     before = ti.Vector.zero(ti.f64, 5)
@@ -275,7 +279,7 @@ def solve_wheelset(
 
 @ti.func
 def record_wheels(b: int, wheelset: int, row: int, contact: Array, force: Array, rail_force: Array, wheel_out: Array):
-    """Everything the wheels of a wheelset report, see ``layout``."""
+    """Record the output of both wheels of a wheelset, see ``layout``."""
     for side in range(2):
         for m in ti.static(range(3)):
             wheel_out[b, row, wheelset, side, at.LONGITUDINAL_CREEPAGE + m] = contact[b, wheelset, side, wr.XI_X + m]
@@ -329,9 +333,9 @@ def wheel_forces(
     ti.loop_config(serialize=True)
     for b in range(wheelset_u.shape[0]):
         for w in range(wheelset_u.shape[1]):
-            felt = ti.Vector.zero(ti.f64, at.N_IRREGULARITY)
+            channels = ti.Vector.zero(ti.f64, at.N_IRREGULARITY)
             for m in ti.static(range(at.N_IRREGULARITY)):
-                felt[m] = irregularity[b, w, m]
+                channels[m] = irregularity[b, w, m]
             x, dx = ti.Vector.zero(ti.f64, 5), ti.Vector.zero(ti.f64, 5)
             for m in ti.static(range(5)):
                 x[m] = wheelset_u[b, w, m]
@@ -344,7 +348,7 @@ def wheel_forces(
                 x,
                 dx,
                 uw.stored_rail(b, w, 0, rail_motion),
-                felt,
+                channels,
                 rolls,
                 table,
                 constants,
@@ -357,7 +361,7 @@ def wheel_forces(
                 x,
                 dx,
                 uw.stored_rail(b, w, 1, rail_motion),
-                felt,
+                channels,
                 rolls,
                 table,
                 constants,

@@ -1,18 +1,19 @@
-"""Fastening forces: what the rails pull at the seats, what the seats answer, and the way back to the rails' modes.
+"""Fastening forces: rail motion at the seats, forces of the seats, and these projected on the rails' modes.
 
-The seats move backwards through the window and keep their spacing d, so with s_0 the first seat and j its follower
+The seats move backwards through the window and keep their spacing d, so with s_0 the first seat, j counted from it
 
     sin(k_i (s_0 + j d)) = sin(k_i s_0) cos(k_i j d) + cos(k_i s_0) sin(k_i j d)
 
-and the tables of cos(k_i j d), sin(k_i j d) are constant. A damper feels the material rate D = d/dt - V d/ds, so a
-seat's spring and damper pull with k u + c du/dt - V c u': one row of modal numbers (k q + c dq/dt | -V c k_i q) against
-sines and cosines. The products with the shapes are the host's; here are their factors and what comes of them.
+and the tables of cos(k_i j d), sin(k_i j d) are constant. A damper responds to the material rate D = d/dt - V d/ds, so
+the force of a seat by the rail's motion is k u + c du/dt - V c u': one row of modal factors
+(k q + c dq/dt | -V c k_i q) against sines and cosines. The products with the shapes are the host's; here are their
+factors and the forces that follow.
 Signs as MODEL: F_V down on the slab, F_L to the right on the slab, M_b right-handed on the slab.
 
-The slab's own share of the fastening (its motion times k, c) stands in the slab's implicit block. The force on the
-slab is therefore taken with the slab at its predictor, that on the rail with the slab at the iterate: both are the same
-force once the passes have converged. The rail's implicit block holds a smeared fastening; what it adds there at the
-iterate is taken off here (``smeared``).
+The slab's own share of the fastening (its motion times k, c) is in the slab's implicit block. The force on the slab is
+therefore evaluated with the slab at its predictor, that on the rail with the slab at the iterate: both are the same
+force once the passes have converged. The rail's implicit block contains a smeared fastening; its contribution at the
+iterate is subtracted here (``smeared``).
 """
 
 import taichi as ti
@@ -37,7 +38,7 @@ def seat_shapes(n: int, seats: int, s0: float, length: float, table: Array, shap
 def pull_factors(
     b: int, dims: Array, V: float, constants: Array, row_u: Template, row_v: Template, motion: Array, factor_out: Array
 ):
-    """Modal numbers of what both rails pull at the seats: vertical force, lateral force, moment.
+    """Modal factors of the forces at the seats by the motion of both rails: vertical force, lateral force, moment.
 
     Displacements and velocities are in rows ``row_u`` and ``row_v``; ``factor_out[b, rail, row, :]`` has 2 n entries:
     those for the sines, then those for the cosines.
@@ -66,7 +67,7 @@ def pull_factors(
 def slab_pull_factors(
     b: int, dims: Array, constants: Array, row_u: Template, row_v: Template, motion: Array, factor_out: Array
 ):
-    """Of all slab coordinates k u + c du/dt, shape (trains, slots, dofs); the last two are lateral."""
+    """Forces k u + c du/dt of all slab coordinates, shape (trains, slots, dofs); the last two are lateral."""
     n = dims[at.SLAB_DOFS]
     kv, cv = constants[at.K_VERTICAL], constants[at.C_VERTICAL]
     kl, cl = constants[at.K_LATERAL], constants[at.C_LATERAL]
@@ -96,8 +97,8 @@ def seat_forces(
         dims: Sizes, see ``layout``.
         constants: Numbers, see ``layout``.
         scale: 1 for a sound fastening, 0 for a failed one, shape (trains, seats, 2).
-        rail_pull: What the rails pull: vertical, lateral, moment [N, N, N m], shape (trains, 2, 3, seats).
-        slab_pull: What the slabs' motion takes off, moment per b^2, shape (2, trains, slots, 5, seats per slab).
+        rail_pull: Forces by the rails' motion: vertical, lateral, moment [N, N, N m], shape (trains, 2, 3, seats).
+        slab_pull: Forces by the slabs' motion, moment over b^2, shape (2, trains, slots, 5, seats per slab).
         force_out: F_V, F_L and the roll moment M_b - a F_L on the rails, shape (trains, 2, 3, seats).
         slab_force_out: Forces on the slabs, shape (trains, slots, 5, seats per slab).
     """
@@ -130,7 +131,7 @@ def seat_forces(
                     F_V -= factor * slab_pull[iterate, b, slot, rail, seat]
                     M_b -= factor * base2 * slab_pull[iterate, b, slot, 2 + rail, seat]
                     F_L -= factor * slab_pull[iterate, b, slot, 4, seat]
-                F_V += depth * depth * V  # to the ground: swallows waves before the window's end sends them back
+                F_V += depth * depth * V  # to the ground: absorbs waves before the window's end reflects them
                 F_L += depth * depth * L
                 M_b += depth * depth * M
             force_out[b, rail, 0, j] = F_V
@@ -142,15 +143,9 @@ def seat_forces(
 
 @ti.func
 def rail_forces(b: int, iterate: int, dims: Array, constants: Array, shape: Array, force: Array, motion: Array):
-    """F of the rails: linear forces, seats by row-dot products, and what A_s holds of the seats at the iterate."""
+    """F of the rails: linear forces, seats by row-dot products, and the smeared seats A_s a at the iterate."""
     n, seats, lateral = dims[at.MODES], dims[at.SEATS], dims[at.LATERAL]
-    per_mode = constants[at.SMEARING] * constants[at.LENGTH] / (2.0 * constants[at.SPACING])
-    kv = per_mode * (
-        constants[at.BETA_DT2] * constants[at.K_VERTICAL] + constants[at.GAMMA_DT] * constants[at.C_VERTICAL]
-    )
-    kl = per_mode * (
-        constants[at.BETA_DT2] * constants[at.K_LATERAL] + constants[at.GAMMA_DT] * constants[at.C_LATERAL]
-    )
+    kv, kl = constants[at.SMEARED_VERTICAL], constants[at.SMEARED_LATERAL]
     a, base2 = constants[at.ARM_FASTENING], constants[at.HALF_BASE] * constants[at.HALF_BASE]
     for rail in range(2):
         for i in range(n):

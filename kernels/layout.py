@@ -1,4 +1,4 @@
-"""Where things stand in the arrays that host and kernels share.
+"""Layout of the arrays that host and kernels share.
 
 The motion of all trains is one array ``motion[row, i]``. A row is a copy of the generalised coordinates, a
 column one coordinate: first the vertical rail blocks of all trains (train, rail, w_1..w_N, theta_y,1..N), then the
@@ -9,7 +9,7 @@ is the outermost index of every block, so each block is a contiguous right-hand 
 # Rows of ``motion``. The predictors are a product of rows U, V, A, the correctors one of A and the predictors.
 U, V, A = 0, 1, 2  # displacement, velocity, acceleration: at t_n between steps, the iterate at t_{n+1} within one
 U_PREDICTED, V_PREDICTED = 3, 4  # Newmark predictors of t_{n+1}
-LINEAR = 5  # what C v + K u at the predictors does: force -(C v + K u) of the rails, acceleration of slabs and vehicles
+LINEAR = 5  # effect of C v + K u at the predictors: force -(C v + K u) of the rails, acceleration of slabs and vehicles
 F = 6  # right-hand side of the implicit solve
 MOTION_ROWS = 7
 
@@ -59,18 +59,19 @@ MOTION_ROWS = 7
     TABLE_DU,
     TABLE_ALPHA0,
     TABLE_DALPHA,
-    SMEARING,  # factor on the smeared fastenings of the implicit rail blocks
-    RESIDUAL_VERTICAL,  # compliance of the modes left out, under a wheel, in w, v, theta_x; zero if not wanted
+    SMEARED_VERTICAL,  # A_s: smeared fastenings of the implicit rail blocks, by mode [kg]
+    SMEARED_LATERAL,
+    RESIDUAL_VERTICAL,  # compliance of the truncated modes under a wheel in w, v, theta_x; zero if not added
     RESIDUAL_LATERAL,
     RESIDUAL_TORSION,
     ABSORBING_ZONE,  # length of the zones at the window's ends with more fastening, to the ground [m]
     N_CONSTANTS,
-) = range(31)
+) = range(32)
 
 # Columns of ``clock[step, :]`` (float64): the window at t_{n+1}.
 (POSITION, SPEED, SPEED_RATE, FIRST_SEAT_S, FIRST_SEAT, FIRST_SLAB, N_CLOCK) = range(7)
 
-# Entries of ``tick`` (int32): what the launch is to do.
+# Entries of ``tick`` (int32): step, pass and record of a launch.
 (STEP, PASS, LAST_PASS, WHEEL_RECORD, N_TICK) = range(5)
 
 # Channels of the irregularity at a wheelset: track values and their slopes along x.
@@ -79,7 +80,7 @@ MOTION_ROWS = 7
 # Columns of the contact geometry table.
 (GAP, S_WHEEL, S_RAIL, RADIUS, TAN_GAMMA, HERTZ, C11, C22, C23, C33, N_TABLE) = range(11)
 
-# What a wheel puts out; forces of the wheel on the rail in the track frame.
+# Output of a wheel; forces of the wheel on the rail in the track frame.
 (
     NORMAL_FORCE,
     VERTICAL_FORCE,

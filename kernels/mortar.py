@@ -51,7 +51,7 @@ def bed_force_and_pressure(
         k: Bed stiffness per area [N/m^3].
         c: Bed damping per area [N s/m^3].
         explicit: 1: add the whole force of the bed, lateral included. 0: the linear bed belongs to the
-            implicit part; add only what a bed without tension deviates from it.
+            implicit part; add only the deviation of a bed without tension from it.
         no_tension: 1: the bed does not pull.
         base: Column of the slab's first DOF.
         n: DOFs of the slab; the last two are lateral displacement and yaw.
@@ -86,7 +86,7 @@ def bed_force_and_pressure(
             smallest = ti.min(smallest, total)
             p = carried
             if explicit == 0:
-                p = carried - linear  # exactly zero where the bed has not let go
+                p = carried - linear  # exactly zero where the bed is in contact
             if p != 0.0:
                 for i in ti.static(range(12)):
                     F[i] += weight[q] * p * shape[q, i]

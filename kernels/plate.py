@@ -152,7 +152,7 @@ def assemble_plates(
 ):
     """Assemble all elements of all designs, gathering by node.
 
-    One item owns the three rows of one node and takes its (at most four) elements in a fixed order: no
+    One loop item owns the three rows of one node and adds its (at most four) elements in a fixed order: no
     atomics, and the same sum for entry (i, j) as for (j, i).
 
     Args:

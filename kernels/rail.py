@@ -5,7 +5,7 @@ Field by field, with mu the mass density of the field, l the window and G_ij = i
     f = -K_el u + mu (l/2) V^2 k^2 u + mu G (2 V du/dt + dV/dt u)
 
 that is -(C v + K u) with C = -2 V mu G, K = K_el + mu (V^2 int W W'' - dV/dt G). G is dense (it couples odd with even
-modes), so its product is the host's: ``flow`` is its factor, ``drift`` what comes of it, all fields of all trains as
+modes), so its product is the host's: ``flow`` is the factor, ``drift`` the product, all fields of all trains as
 right-hand sides of one matrix. Their fields are in the order w, v, theta_x (sines), theta_y, theta_z (cosines).
 """
 

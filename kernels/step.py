@@ -1,4 +1,4 @@
-"""The launches of a step: factors of the host's products, forces, contact.
+"""Kernels of a step: factors of the host's products, forces, contact.
 
 A step t_n -> t_{n+1}, with a the iterate of the acceleration:
 
@@ -6,18 +6,18 @@ A step t_n -> t_{n+1}, with a the iterate of the acceleration:
     prepare             shapes of the seats where they stand at t_{n+1}; factors of the products; rails under the wheels
     (host)              products of the convective flow, of the slabs' and the train's own motion
     each pass:
-      (host)            what rails and slabs pull at the seats
+      (host)            forces that the motion of rails and slabs exerts at the seats
       mortar_forces     F of the slabs where the bed is not wholly implicit
       forces_and_contact  F of rails and train: linear forces, fastenings at the iterate, smeared part of a, suspension,
-                        gravity; then contact against compliance, which F takes up last
+                        gravity; then contact against compliance, which is added to F last
       (host)            a = A^-1 F, block by block; u = u~ + beta dt^2 a, v = v~ + gamma dt a
       factors           of the next pass's products
 
-The wheels' motion at the step's end is what rows of A^-1 make of F, so contact needs no solve before it. In the first
-pass the iterate is the predictor, that is a = 0 (Hughes and Liu).
+The wheels' motion at the step's end is the product of rows of A^-1 with F, so contact needs no solve before it. In the
+first pass the iterate is the predictor, that is a = 0 (Hughes and Liu).
 
-Serial over trains by default; ``parallel`` gives each train a block of 512 iterations, which is what Taichi's
-thread pool hands out at least.
+Serial over trains by default; ``parallel`` gives each train a block of 512 iterations, the least that Taichi's thread
+pool assigns to a thread.
 """
 
 import taichi as ti
@@ -65,7 +65,7 @@ def prepare(
     slab_factor_out: Reals3,
     rail_predicted_out: Reals4,
 ):
-    """What the predictors are needed for; see the module. Shapes as in ``tiengine.engine.scratch``."""
+    """Shapes, factors and rail motion from the predictors; see the module. Shapes of the arrays as in ``scratch``."""
     ti.loop_config(serialize=True)
     for _ in range(1):  # one set of seat shapes for all trains
         fs.seat_shapes(
@@ -96,7 +96,7 @@ def factors(
     rail_factor_out: Reals4,
     slab_factor_out: Reals3,
 ):
-    """What rails and slabs pull with at the iterate."""
+    """Factors of the forces at the seats at the iterate."""
     ti.loop_config(serialize=not parallel)
     for z in range(dims[at.TRAINS] * ti.static(512 if parallel else 1)):
         if z % ti.static(512 if parallel else 1) == 0:
@@ -115,14 +115,14 @@ def mortar_forces(
     shape: Reals2,
     weight: Reals1,
     factor: Reals3,
-    rest: Reals3,
+    at_rest: Reals3,
     lateral_K: Reals3,
     lateral_C: Reals3,
     numbers: Reals1,
     motion: Reals2,
     pressure_out: Reals3,
 ):
-    """F of the slabs: what of the bed is not in the implicit part (nothing in mode 0); its extreme pressures.
+    """F of the slabs: the part of the bed that is not implicit (nothing in mode 0); its extreme pressures.
 
     ``rows`` are the rows of displacement and velocity.
     """
@@ -137,8 +137,8 @@ def mortar_forces(
                 for i in range(base, base + n):
                     motion[at.F, i] = 0.0
                 pressure = mortar.bed_force_and_pressure(
-                    design[b, slot], index, shape, weight, factor, rest, lateral_K, lateral_C, numbers[0], numbers[1],
-                    explicit, no_tension, base, n, motion, rows[0], rows[1], at.F,
+                    design[b, slot], index, shape, weight, factor, at_rest, lateral_K, lateral_C, numbers[0],
+                    numbers[1], explicit, no_tension, base, n, motion, rows[0], rows[1], at.F,
                 )  # fmt: skip
                 for m in ti.static(range(2)):
                     pressure_out[b, slot, m] = pressure[m]
@@ -188,7 +188,7 @@ def forces_and_contact(
     iterations_out: Ints2,
     wheel_record_out: Reals5,
 ):
-    """Everything explicit but the mortar; see the module. Array shapes as in ``tiengine.model.model`` and others.
+    """All explicit forces but the mortar's; see the module. Array shapes as in ``tiengine.model.model`` and others.
 
     ``rows`` are the rows of displacement and velocity of the train in this pass.
     """
@@ -218,7 +218,7 @@ def forces_and_contact(
             for w in range(wheelsets):
                 uw.add_wheelset_force(b, w, 1.0, dims, wheelset_dof, wheelset_force, motion)
             for w in range(wheelsets):
-                felt = ct.felt_at(b, step, w, irregularity)
+                channels = ct.channels_at(b, step, w, irregularity)
                 x, dx = uw.wheelset_without_change(b, w, dims, constants, wheelset_dof, vehicle_answer, motion)
                 left = uw.rail_without_change(
                     b, w, 0, dims, constants, rail_answer, rail_coupling, motion, rail_predicted, rail_force
@@ -228,7 +228,7 @@ def forces_and_contact(
                 )
                 uw.add_wheelset_force(b, w, -1.0, dims, wheelset_dof, wheelset_force, motion)
                 count = ct.solve_wheelset(
-                    b, w, V, x, dx, left, right, felt, dims, constants, wheel, table, wheelset_compliance,
+                    b, w, V, x, dx, left, right, channels, dims, constants, wheel, table, wheelset_compliance,
                     rail_coupling, contact, force, wheelset_force, rail_force, tolerance,
                 )  # fmt: skip
                 uw.add_wheelset_force(b, w, 1.0, dims, wheelset_dof, wheelset_force, motion)

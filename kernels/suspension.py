@@ -1,7 +1,7 @@
 """Nonlinear suspension elements: dampers and stops by odd piecewise-linear tables.
 
 Element e lengthens by d = sum_k row[e, k] u[base + index[e, k]]. Its force is a table of the rate (kind 0) or
-of the elongation (kind 1). The slope ``linear[e]`` of that table already stands in the train's C or K, so
+of the elongation (kind 1). The slope ``linear[e]`` of that table is already contained in the train's C or K, so
 only the deviation
 
     F(q) - linear q,   q = d or its rate,
@@ -16,7 +16,7 @@ from tiengine.kernels.types import Array, Ints1, Ints2, Reals1, Reals2, Reals3
 
 @ti.func
 def table_force(e: int, q: float, table: Array):
-    """Odd force of element e at abscissa q; the last slope goes on beyond the last point."""
+    """Odd force of element e at abscissa q; the last slope continues beyond the last point."""
     x = ti.abs(q)
     force = 0.0
     for j in range(table.shape[1] - 1):
@@ -48,7 +48,7 @@ def add_suspension_forces(
         index: Coordinates of each element, shape (n_e, 12).
         row: Elongation per coordinate, shape (n_e, 12).
         kind: 0 force of the rate, 1 force of the elongation, shape (n_e,).
-        linear: Slope that stands in C or K [N s/m, N/m], shape (n_e,).
+        linear: Slope contained in C or K [N s/m, N/m], shape (n_e,).
         table: Points (abscissa, force), shape (n_e, points, 2).
         motion: State, one column a coordinate.
         row_u: Row of the displacements [m, rad].

@@ -1,8 +1,8 @@
-"""Wheels and the linear rest of a step: what moves under a wheel without it, and what takes up its forces.
+"""Wheels and the linear part of a step: motion under a wheel without its force, and its forces in F.
 
 Wheels stand still in the window, so that their places in A^-1 are constant: ``answer`` are its rows there, and
-``coupling`` the rows' values at all wheels of a rail. The motion at the step's end is x = x~ + S (rows of A^-1) F with
-S = beta dt^2 for displacements and gamma dt for rates.
+``coupling`` the values of the rows at all wheels of a rail. The motion at the step's end is x = x~ + S (rows of A^-1) F
+with S = beta dt^2 for displacements and gamma dt for rates.
 """
 
 import taichi as ti
@@ -54,7 +54,7 @@ def rail_without_change(
     """Rail under a wheel at the step's end if no wheel changed the force it has now.
 
     ``answer[w, 0 or 1, :]`` are the rows of A^-1, and of its slope, under wheelset w: 2 n for w, 3 n for v, 3 n for
-    theta_x. ``coupling[w, 0 or 1, k]`` is what forces on w, v, theta_x under wheelset k do there.
+    theta_x. ``coupling[w, 0 or 1, k]`` is the response there to forces on w, v, theta_x under wheelset k.
     """
     n = dims[at.MODES]
     free = stored_rail(b, wheelset, rail, predicted)
@@ -99,7 +99,7 @@ def wheelset_without_change(
 
 @ti.func
 def add_wheelset_force(b: int, wheelset: int, sign: float, dims: Array, dof: Array, force: Array, motion: Array):
-    """Add the contact forces on a wheelset to F, or take them off."""
+    """Add the contact forces on a wheelset to F, or subtract them."""
     base = dims[at.VEHICLES] + b * dims[at.VEHICLE_DOFS]
     for m in ti.static(range(5)):
         q = base + dof[wheelset, m]

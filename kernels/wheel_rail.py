@@ -13,7 +13,7 @@ import taichi as ti
 from tiengine.kernels import layout as at
 from tiengine.kernels.types import Array, Template
 
-# A wheel's contact state: what geometry and kinematics leave for the law and for the force directions.
+# Contact state of a wheel: results of geometry and kinematics for the law and the force directions.
 (DELTA, XI_X, XI_Y, XI_S, SIN, COS, S_W, S_R, R_C, KH, K11, K22, K23, K33, SHIFT, Z_IRR, Y_IRR, RAIL_W, N_CONTACT) = (
     range(19)
 )
@@ -34,7 +34,7 @@ def catmull_rom(f: float):
 
 @ti.func
 def lookup(u: float, alpha: float, table: Array, constants: Array):
-    """All columns of the contact table at (u, alpha); outside the table its edge cells are continued flat."""
+    """All columns of the contact table at (u, alpha); outside the table its edge values are kept."""
     x = (u - constants[at.TABLE_U0]) / constants[at.TABLE_DU]
     y = (alpha - constants[at.TABLE_ALPHA0]) / constants[at.TABLE_DALPHA]
     i = ti.min(ti.max(ti.cast(ti.floor(x), ti.i32), 1), table.shape[0] - 3)
@@ -107,7 +107,7 @@ def contact_state(
         - g[at.GAP]
     )
 
-    # Across, the rail head's material velocity counts. Down, a wheel that follows the rail's shape rolls on it.
+    # Lateral: the material velocity of the rail head. Vertical: a wheel that follows the rail's shape rolls on it.
     across = (
         dx[0] - V * x[4] - dx[2] * r_c - (rail_rate[1] - V * rail_slope[1]) - h_c * (rail_rate[2] - V * rail_slope[2])
     )
@@ -197,7 +197,7 @@ def contact_law(state: Template, friction: float):
 
 @ti.func
 def placing(state: Template):
-    """What the directions of a wheel's forces depend on: sin and cos of gamma_t, s_w, s_r, r_c."""
+    """Quantities that the directions of a wheel's forces depend on: sin and cos of gamma_t, s_w, s_r, r_c."""
     return ti.Vector([state[SIN], state[COS], state[S_W], state[S_R], state[R_C]])
 
 

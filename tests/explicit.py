@@ -1,4 +1,4 @@
-"""The explicit half of a pass at a given state: what rails, slabs and seats feel, the wheels lifted off."""
+"""Explicit part of a pass at a given state: forces of rails, slabs and seats, with the wheels lifted off."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.chunk import Chunk
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 
@@ -23,24 +24,24 @@ class Explicit:
     """
 
     def __init__(
-        self, model: Model, state: State, clock: NDArray[np.float64], constants: NDArray[np.float64] | None = None
+        self, model: Model, state: SineState, clock: NDArray[np.float64], constants: NDArray[np.float64] | None = None
     ) -> None:
         """Bind to a state and a window position, clock of shape (1, N_CLOCK)."""
         model = model if constants is None else replace(model, constants=constants)
-        chunk = Chunk.empty(model, 1, 1, 1)
+        chunk = Chunk.empty(model.ingredients, 1, 1, 1)
         chunk.clock[:] = clock
-        self.state, self.stepper, self.model = state, Stepper(model, state, chunk), model
+        self.state, self.stepper, self.model = state, SineStepper(model, state, chunk), model
         self.stepper.move(0)
 
     def first(self) -> None:
         """Forces of the first pass, from rows U_PREDICTED and V_PREDICTED."""
-        train = self.model.given.train
+        train = self.model.ingredients.train
         self.state.view(at.U_PREDICTED, "vehicles")[:, 1 : train.n_dof : 5] = LIFTED
         self._run(("prepare", "rails", "slabs", "trains", "seats", "forces and contact"), 0)
 
     def second(self) -> None:
         """Forces of the second pass, from rows U, V, A; after the first."""
-        train = self.model.given.train
+        train = self.model.ingredients.train
         self.state.view(at.U, "vehicles")[:, 1 : train.n_dof : 5] = LIFTED
         self._run(("factors", "seats", "forces and contact"), 1)
 
@@ -53,7 +54,7 @@ class Explicit:
 
     def on_rails(self, train: int) -> NDArray[np.float64]:
         """Generalised forces of the seats on the rails, shape (2, 5, N): w, theta_y, v, theta_z, theta_x."""
-        n = self.model.given.modes
+        n = self.model.ingredients.modes
         v, l = (
             self.state.view(at.F, name)[train] - self.state.view(at.LINEAR, name)[train]
             for name in ("vertical", "lateral")

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
@@ -40,20 +41,20 @@ def paper_model(*overrides: str, V: float = V350, dt: float = 1e-4, **changes: A
 
 
 class Run:
-    """A state marched at constant speed, one step a call."""
+    """A state advanced at constant speed, every step recorded."""
 
     def __init__(self, model: Model, V: float, X: float = 0.0, steps: int = 1000, start: bool = True) -> None:
         """Put the train into steady rolling at chainage X of the window's rear end [m]."""
         self.model, self.V, self.X = model, V, X
-        self.state = State.at_rest(model)
+        self.state = SineState.at_rest(model)
         if start:
             equilibrium(model, self.state, X, V)
-        self.chunk = Chunk.empty(model, steps, steps, steps)
-        self.stepper = Stepper(model, self.state, self.chunk)
+        self.chunk = Chunk.empty(model.ingredients, steps, steps, steps)
+        self.stepper = SineStepper(model, self.state, self.chunk)
 
-    def march(self, steps: int, irregularity: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    def advance(self, steps: int, irregularity: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Advance; returns the wheels' output, shape (steps, W, 2, N_WHEEL)."""
-        X = self.X + self.V * self.model.given.newmark.dt * np.arange(1, steps + 1)
+        X = self.X + self.V * self.model.ingredients.newmark.dt * np.arange(1, steps + 1)
         trains, wheelsets = self.state.iterations.shape
         if irregularity is None:
             irregularity = np.zeros((trains, steps, wheelsets, at.N_IRREGULARITY))

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State, positions
+from tiengine.engine.sine_state import SineState
 from tiengine.engine.static_track import StaticTrack
+from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 
@@ -33,9 +34,9 @@ def test_published_deflection(beam: str, modes: int) -> None:
     """Static deflection under 70 kN, all printed digits; the Euler rows with shear made 1e-5 of what it is."""
     model = paper_model(modes=modes)
     if beam == "euler":
-        section = model.given.rail
+        section = model.ingredients.rail
         model = paper_model(modes=modes, rail=section.model_copy(update={"G": 1e5 * section.G}))
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     state.enter(model, 0, 0)
     state.first_slab = RIGID_GROUND
     track = StaticTrack(model, state, 0.315, 0.0)
@@ -48,13 +49,13 @@ def test_published_deflection(beam: str, modes: int) -> None:
         assert not rails[1].any()  # on rigid ground the other rail rests
 
 
-def balance(model: Model, state: State, X: float, V: float) -> NDArray[np.float64]:
+def balance(model: Model, state: SineState, X: float, V: float) -> NDArray[np.float64]:
     """Forces out of balance on the slabs, shape (slots, dofs), at the state's displacements, at rest in the frame.
 
     Those on the rails are left in row F.
     """
     state.motion[at.U_PREDICTED], state.motion[at.V_PREDICTED] = state.motion[at.U], state.motion[at.V]
-    clock = positions(model, np.array([X]), np.array([V]), np.zeros(1)).clock
+    clock = window_clock(model.ingredients.slab, np.array([X]), np.array([V]), np.zeros(1))
     explicit = Explicit(model, state, clock)
     explicit.first()
     out = explicit.on_slots(0)
@@ -74,14 +75,14 @@ DEFECTS = (
 def test_kernels_balance_the_static_solution(X: float, V: float, overrides: tuple[str, ...]) -> None:
     """Loads on both rails: the kernels find host-made displacements in balance, defects and convection included."""
     model = paper_model(*overrides, V=V350)
-    state = State.at_rest(model)
-    clock = positions(model, np.array([X]), np.array([V]), np.zeros(1)).clock[0]
+    state = SineState.at_rest(model)
+    clock = window_clock(model.ingredients.slab, np.array([X]), np.array([V]), np.zeros(1))[0]
     state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
     track = StaticTrack(model, state, float(clock[at.FIRST_SEAT_S]), V)
     rng = np.random.default_rng(5)
     force = rng.standard_normal((4, 2, 3)) * [70e3, 20e3, 2e3]
     rails, slabs = track.motion(force)
-    n = model.given.modes
+    n = model.ingredients.modes
     state.view(at.U, "vertical")[0] = rails[:, : 2 * n]
     state.view(at.U, "lateral")[0] = rails[:, 2 * n :]
     state.view(at.U, "slabs")[0] = slabs
@@ -102,7 +103,7 @@ def test_kernels_balance_the_static_solution(X: float, V: float, overrides: tupl
 def test_compliance_is_symmetric_at_rest() -> None:
     """Maxwell and Betti: at V = 0 the compliance between wheels is symmetric; convection and dampers break it."""
     model = paper_model()
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     state.enter(model, 0, 0)
 
     def compliance(V: float) -> NDArray[np.float64]:
@@ -110,9 +111,9 @@ def test_compliance_is_symmetric_at_rest() -> None:
         unit = np.eye(24).reshape(24, 4, 2, 3)
         return track.under_wheels(unit)[..., :3].reshape(24, 24)
 
-    rest, moving = compliance(0.0), compliance(V350)
-    np.testing.assert_allclose(rest, rest.T, atol=1e-12 * rest.max())
-    assert np.all(np.linalg.eigvalsh(rest) > 0.0)
+    still, moving = compliance(0.0), compliance(V350)
+    np.testing.assert_allclose(still, still.T, atol=1e-12 * still.max())
+    assert np.all(np.linalg.eigvalsh(still) > 0.0)
     assert np.abs(moving - moving.T).max() > 1e-4 * moving.max()
 
 
@@ -122,14 +123,14 @@ def test_local_compliance_stands_in_for_the_modes_left_out() -> None:
     found = {}
     for modes, local in ((72, False), (72, True), (288, True)):
         model = paper_model(modes=modes, local_compliance=local)
-        state = State.at_rest(model)
+        state = SineState.at_rest(model)
         state.enter(model, 0, 0)
         load = np.zeros((1, 4, 2, 3))
         load[..., 0], load[..., 1], load[..., 2] = 69e3, 3e3, 300.0
         found[modes, local] = StaticTrack(model, state, 0.315, V).under_wheels(load)[0]
     exact = found[288, True]
     without, with_it = (np.abs(found[72, local] - exact).max(axis=(0, 1)) for local in (False, True))
-    # a half is asked for: the contrast of seats under short waves is not in the correction, nor the phase of sin^2;
+    # a half is required: the contrast of seats under short waves is not in the correction, nor the phase of sin^2;
     # the lateral deflection comes from bending and torsion, whose long waves are all there: it may only not be worse
     assert np.all(with_it[[0, 2]] < 0.5 * without[[0, 2]])
     assert with_it[1] <= without[1]

@@ -1,4 +1,4 @@
-"""Profiles and measured tracks as nobody means them: changed texts of every format, read as they are or refused."""
+"""Damaged profiles and measured tracks: changed texts of every format are read as they are or refused."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tiengine.contact.profile import Kind, Profile, load_profile
 from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
 from tiengine.irregularity.measured_files import LARGEST_CHAINAGE, LARGEST_HEIGHT, read_series
 
-from ..fuzzing import DAMAGES, EXAMPLES, Damage, mutated_texts, on_many, refused
 from ..contact.test_profile_files import columns, miniprof, simpack
+from ..fuzzing import DAMAGES, EXAMPLES, Damage, mutated_texts, on_many, refused
 
 KINDS: dict[Kind, str] = {"wheel": "LMA", "rail": "CHN60"}
 WRITERS = {".prw": simpack, ".prr": simpack, ".whl": miniprof, ".ban": miniprof, ".csv": columns}
@@ -29,14 +29,14 @@ PLAIN = "x,z_v\n" + "\n".join(f"{x:.1f},{1e-3 * np.sin(x):.6f}" for x in X)
 
 
 def text_of(suffix: str, kind: Kind) -> str:
-    """A preset's points, one in twenty, as a file of some format."""
+    """Every twentieth point of a preset, as a file of some format."""
     profile = load_profile(KINDS[kind], kind)
     points = np.stack([profile.y, profile.z], axis=1)[::20] * 1e3
     return WRITERS[suffix](points, kind)
 
 
 def assert_curve(profile: Profile) -> None:
-    """What was taken is a curve of the size of a wheel or rail, smooth enough to be run on."""
+    """An accepted profile is a smooth curve of the size of a wheel or rail."""
     assert np.isfinite(profile.y).all()
     assert np.isfinite(profile.z).all()
     assert (np.diff(profile.y) > 0.0).all()
@@ -49,7 +49,7 @@ def assert_curve(profile: Profile) -> None:
 @EXAMPLES
 @pytest.mark.parametrize(("suffix", "kind"), FORMATS)
 def test_changed_profiles(examples: int, suffix: str, kind: Kind, tmp_path: Path) -> None:
-    """Refused with file and reason, or a curve."""
+    """A changed file is refused with file and reason, or gives a curve."""
     path = tmp_path / f"fuzzed{suffix}"
 
     def check(text: str) -> bool:
@@ -67,7 +67,7 @@ def test_changed_profiles(examples: int, suffix: str, kind: Kind, tmp_path: Path
 
 @EXAMPLES
 def test_profiles_of_any_bytes(examples: int, tmp_path: Path) -> None:
-    """Bytes changed anywhere, Latin-1 and broken UTF-8 among them."""
+    """Bytes changed anywhere, including Latin-1 and invalid UTF-8, are refused or give a curve."""
     contents = {each: text_of(*each).encode() for each in FORMATS}
 
     def check(given: tuple[tuple[str, Kind], Damage]) -> bool:
@@ -84,7 +84,7 @@ def test_profiles_of_any_bytes(examples: int, tmp_path: Path) -> None:
 
 
 def test_two_columns_are_what_they_say(tmp_path: Path) -> None:
-    """A changed list that is taken has the points that a plain reader finds in it."""
+    """A changed list that is accepted has the points that a simple reader finds in it."""
     path = tmp_path / "fuzzed.csv"
     text = text_of(".csv", "rail")
 
@@ -108,7 +108,7 @@ def test_two_columns_are_what_they_say(tmp_path: Path) -> None:
 @EXAMPLES
 @pytest.mark.parametrize("base", [TRACK, PLAIN], ids=["many-columns", "two-columns"])
 def test_changed_tracks(examples: int, base: str, tmp_path: Path) -> None:
-    """Refused with file and line, or finite numbers at rising chainages; two columns are those that a reader sees."""
+    """A changed track is refused with file and line, or gives finite numbers at rising chainages, as in the text."""
     path = tmp_path / "track.csv"
 
     def check(text: str) -> bool:
@@ -135,7 +135,7 @@ def test_changed_tracks(examples: int, base: str, tmp_path: Path) -> None:
 
 
 def test_changed_tracks_under_a_train(tmp_path: Path) -> None:
-    """What is taken gives finite irregularity everywhere, with a band-pass and without."""
+    """An accepted track gives finite irregularity everywhere, with a band-pass and without."""
     path = tmp_path / "track.csv"
     chainages = np.linspace(-10.0, 60.0, 71)
 

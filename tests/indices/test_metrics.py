@@ -19,7 +19,8 @@ from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml
 from tiengine.report.metrics_table import metrics_table
 from tiengine.result_files.channels import WHEEL
-from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
+from tiengine.result_files.layout import GroupSpec, TrainLabels
+from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.vehicle.train import assemble, static_wheel_loads
 

@@ -13,6 +13,7 @@ from tiengine.irregularity.irregularity import (
     PATCH_HALF_LENGTH,
     IrregularityParams,
     at_wheels,
+    check_step,
     make_irregularity,
 )
 from tiengine.irregularity.spectrum import (
@@ -282,7 +283,10 @@ def test_wheels():
         ({"wavelength_min": 0.001}, "wavelength_max = 120.0: must be <= 10000 wavelength_min = 10"),
         ({"seed": -1}, "seed = -1: must be greater than or equal to 0"),
         ({"taper": 0.0}, "taper = 0.0: must be greater than 0"),
-        ({"percentile": 0.9}, "percentile = 0.9: not with the German low-disturbance spectrum"),
+        (
+            {"percentile": 0.9},
+            "percentile = 0.9: must not be set: the German low-disturbance spectrum has no percentiles",
+        ),
         (
             {"short_wave": True, "short_wave_min": 0.5},
             "short_wave_min = 0.5: must be >= 0.002818 and < 0.4467",
@@ -303,8 +307,8 @@ def test_bad_parameters_are_refused(settings, message):
 
 def test_bad_use_is_refused():
     """Waves that the step cannot follow, chainages that are no numbers."""
-    with pytest.raises(InputError, match=r"shortest wavelength = 0.05 m: must be >= 8 V dt = 0.0776 m$"):
-        track(wavelength_min=0.05).check_step(97.0, 1e-4)
-    track().check_step(97.0, 1e-3)
+    with pytest.raises(InputError, match=r"shortest wavelength = 0.05: must be at least 8 V dt = 0.0776 m at a time"):
+        check_step(track(wavelength_min=0.05).shortest_wavelength, 97.0, 1e-4)
+    check_step(track().shortest_wavelength, 97.0, 1e-3)
     with pytest.raises(InputError, match="chainage must be finite"):
         track().sample(np.array([0.0, np.nan]))

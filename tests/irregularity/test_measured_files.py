@@ -163,7 +163,7 @@ ROWS = "".join(f"{x},0.001\n" for x in range(10))
         ("x,alignment_right\n" + ROWS, "line 1: column 'alignment_right' needs that of the other rail"),
         ("x,z_v\n" + ROWS + "9,0\n", "line 12: x = 9: must be > the x before it"),
         ("x,z_v\n" + "".join(f"{-x},0\n" for x in range(10)) + "-8,0\n", "line 12: x = -8: must be < the x before"),
-        ("x,z_v\n" + ROWS + "13,0\n", "line 12: x = 13: a gap of 4 m where 1 m is the rule"),
+        ("x,z_v\n" + ROWS + "13,0\n", "line 12: x = 13: a gap of 4 m; the usual step is 1 m"),
         ("x,gauge [mm]\n" + "".join(f"{x},1435\n" for x in range(5)), "line 2: gauge = 1.435 m: must be the deviation"),
     ],
 )

@@ -141,5 +141,7 @@ def test_unknown_spectrum_and_percentile_are_refused():
         InputError, match=r"^irregularity.spectrum = 'german_lo': unknown; did you mean 'german_low'\?$"
     ):
         load_spectrum("german_lo")
-    with pytest.raises(InputError, match=r"percentile = 0.9: not with the FRA class 3 spectrum"):
+    with pytest.raises(
+        InputError, match=r"percentile = 0.9: must not be set: the FRA class 3 spectrum has no percentiles"
+    ):
         load_spectrum("fra_3").mean_factor(0.9)

@@ -91,14 +91,14 @@ def test_lifted_wheel_carries_nothing(model: Model) -> None:
     assert np.isfinite(found.contact).all()
 
 
-# A 1:20 cone, r = 0.43 m, on a rail head of R = 300 mm: FACTS 7.1; Kalker's table at nu = 0.25 beside a/b = 1.25.
+# A 1:20 cone, r = 0.43 m, on a rail head of R = 300 mm: FACTS 7.1; Kalker's table at nu = 0.25 next to a/b = 1.25.
 E, NU, SHEAR = 2.059e11, 0.25, 2.059e11 / 2.5
 C_KALKER = (4.41, 4.02, 1.77, 0.97)
 
 
 def constant_table(model: Model, tangent: float) -> tuple[Model, tuple[float, float, float]]:
     """A wheel whose contact is the same everywhere but for its gap -tan gamma u."""
-    table = model.given.contact
+    table = model.ingredients.contact
     a1, b1, G = (float(q) for q in hertz(0.5 / 0.43, 0.5 / 0.3, E, NU))
     values = np.zeros_like(table.values)
     u = table.u_min + table.du * np.arange(values.shape[0])
@@ -108,8 +108,8 @@ def constant_table(model: Model, tangent: float) -> tuple[Model, tuple[float, fl
     ab = a1 * b1
     values[..., at.C11], values[..., at.C22] = SHEAR * ab * C_KALKER[0], SHEAR * ab * C_KALKER[1]
     values[..., at.C23], values[..., at.C33] = SHEAR * ab**1.5 * C_KALKER[2], SHEAR * ab**2 * C_KALKER[3]
-    given = replace(model.given, contact=replace(table, values=values))
-    return replace(model, given=given), (G, a1, b1)
+    ingredients = replace(model.ingredients, contact=replace(table, values=values))
+    return replace(model, ingredients=ingredients), (G, a1, b1)
 
 
 def test_forces_against_plain_formulas(model: Model) -> None:

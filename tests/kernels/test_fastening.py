@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State, positions
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 from tiengine.track.fastening import seat_count, seat_tables
@@ -42,8 +43,8 @@ class Seated:
 
     def __init__(self, model: Model, X: float, V: float = V350) -> None:
         self.model, self.X, self.V = model, X, V
-        self.state = State.at_rest(model)
-        clock = positions(model, np.array([X]), np.array([V]), np.zeros(1)).clock
+        self.state = SineState.at_rest(model)
+        clock = window_clock(model.ingredients.slab, np.array([X]), np.array([V]), np.zeros(1))
         self.clock = clock
         self.first_slab = int(clock[0, at.FIRST_SLAB])
         self.state.enter(model, int(clock[0, at.FIRST_SEAT]), self.first_slab)
@@ -69,25 +70,25 @@ class Seated:
 
     def on_slabs(self, train: int) -> dict[int, NDArray[np.float64]]:
         """Generalised forces by slab index along the track."""
-        slots = self.model.given.slots
+        slots = self.model.ingredients.slots
         q = self.explicit.on_slots(train)
         return {i: q[i % slots] for i in range(self.first_slab, self.first_slab + slots)}
 
     def rails(self, row: int, train: int) -> NDArray[np.float64]:
         """One row as (2, 5, N): w, theta_y, v, theta_z, theta_x."""
-        n = self.model.given.modes
+        n = self.model.ingredients.modes
         v, l = self.state.view(row, "vertical")[train], self.state.view(row, "lateral")[train]
         return np.concatenate([v.reshape(2, 2, n), l.reshape(2, 3, n)], axis=1)
 
     def slabs(self, row: int, train: int) -> dict[int, NDArray[np.float64]]:
         """One row by slab index along the track."""
-        q, slots = self.state.view(row, "slabs")[train], self.model.given.slots
+        q, slots = self.state.view(row, "slabs")[train], self.model.ingredients.slots
         return {i: q[i % slots] for i in range(self.first_slab, self.first_slab + slots)}
 
     def expected(
         self, train: int, factor: Callable[[int, int], float]
     ) -> tuple[list[Seat], NDArray[np.float64], dict[int, NDArray[np.float64]]]:
-        g = self.model.given
+        g = self.model.ingredients
         u, v = self.slabs(at.U, train), self.slabs(at.V, train)
         return seats(
             self.X,
@@ -134,7 +135,7 @@ def test_against_seat_by_seat(model: Model, seed: int) -> None:
 
 
 def test_slab_motion_enters_twice(model: Model) -> None:
-    """The slab feels its own motion at the predictor, the rail that of the iterate: see the kernel."""
+    """The force on the slab has its motion at the predictor, that on the rail at the iterate: see the kernel."""
     case = Seated(model, 33.3)
     case.randomise(7)
     case.launch()
@@ -159,7 +160,7 @@ def test_action_equals_reaction(model: Model) -> None:
     case = Seated(model, 210.0)
     case.randomise(9)
     case.launch()
-    g = model.given
+    g = model.ingredients
     plate = g.designs.matrices[0]
     w = np.zeros(plate.n)
     w[: plate.n - 2 : 3] = 1.0  # rigid translation of the plate: nodal w
@@ -187,7 +188,7 @@ def test_action_equals_reaction(model: Model) -> None:
 def test_rigid_translation_is_free(model: Model) -> None:
     """Rails and slabs that move together strain no fastening where the rails' sine series has converged."""
     case = Seated(model, 12.0)
-    n = model.given.modes
+    n = model.ingredients.modes
     series = np.array([4.0 / (i * np.pi) if i % 2 else 0.0 for i in range(1, n + 1)])
     # Fejer means of the series of 1 do not overshoot; the error in the middle falls with 1/N
     series = series * (1.0 - np.arange(1, n + 1) / (n + 1.0))
@@ -200,7 +201,7 @@ def test_rigid_translation_is_free(model: Model) -> None:
     force = case.state.seat_force[0][:, :, 25:33]
     error = np.abs(model.window.shape(np.linspace(15.0, 21.0, 61)) @ series - 1.0).max()
     assert error < 0.04
-    k = model.given.fastening
+    k = model.ingredients.fastening
     assert np.abs(force[:, 0]).max() < 1e-3 * k.vertical_stiffness * error * 1.001 + 1e-3 * 1e4 * error
     # a rail running over a ground-fixed shape has no material rate in the middle but that of the series' ripple
     assert np.abs(force[:, 1]).max() < 2e-3 * k.lateral_stiffness * error * 1.5 + 20.0
@@ -216,7 +217,7 @@ def test_dampers_only_take_power(model: Model, seed: int) -> None:
     found, _, _ = case.expected(0, by_number)
     kernel = case.state.seat_force[0]
     first = int(case.clock[0, at.FIRST_SEAT])
-    a = model.given.rail.arm_fastening
+    a = model.ingredients.rail.arm_fastening
     on_slabs = lost = 0.0
     for seat in found:
         F_V, F_L, M = kernel[seat.side, :, seat.number - first]
@@ -258,7 +259,7 @@ def test_seats_enter_and_leave_without_a_jump(model: Model, edge: float) -> None
     for shift in (-1e-9, 1e-9):
         case = Seated(model, X + shift)
         case.randomise(40)
-        case.state.view(at.U, "slabs")[:] = 0.0  # else the slabs' own motion would be felt beyond the end
+        case.state.view(at.U, "slabs")[:] = 0.0  # else the slabs' own motion would act beyond the end
         case.state.view(at.V, "slabs")[:] = 0.0
         case.settle()
         case.constants[[at.C_VERTICAL, at.C_LATERAL]] = 0.0  # -V w' is not zero at the end; its force's share is
@@ -276,7 +277,7 @@ def test_seats_beyond_the_slabs_stand_on_rigid_ground() -> None:
     case.randomise(50)
     case.launch()
     found, on_rails, on_slabs = case.expected(0, lambda number, side: 1.0)
-    assert model.given.slots == 7
+    assert model.ingredients.slots == 7
     assert any(not seat.slab.any() for seat in found)
     largest = max(np.abs(seat.force).max() for seat in found)
     np.testing.assert_allclose(case.on_rails(0), on_rails, atol=1e-11 * largest)
@@ -305,7 +306,7 @@ def test_absorbing_zone_is_more_fastening_to_the_ground(model: Model) -> None:
     for each in (case, plain):
         each.randomise(3)
         each.launch()
-    g = model.given
+    g = model.ingredients
     k, a, b2 = g.fastening, g.rail.arm_fastening, g.rail.half_base**2
     first, inside = int(case.clock[0, at.FIRST_SEAT]), 0
     difference = (case.state.seat_force - plain.state.seat_force)[0]

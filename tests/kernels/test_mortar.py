@@ -18,8 +18,8 @@ TRAINS, SLABS, LEAD = 2, 3, 5  # LEAD columns of a train belong to something els
 DESIGN = np.array([[0, 1, 2], [2, 0, 1]], np.int32)
 
 VOIDS = [
-    MortarVoid(slab=4, x_from=0.0, x_to=1.3, y_from=-1.25, y_to=1.25),
-    MortarVoid(slab=9, x_from=2.1, x_to=3.3, y_from=-0.4, y_to=1.1, factor=0.35),
+    MortarVoid(slab=4, x=(0.0, 1.3), y=(-1.25, 1.25)),
+    MortarVoid(slab=9, x=(2.1, 3.3), y=(-0.4, 1.1), factor=0.35),
 ]
 
 
@@ -168,8 +168,8 @@ def test_lifted_slab_carries_its_weight_at_most(bed: tuple[Slab, Mortar, list[Sl
     for b in range(TRAINS):
         for s in range(SLABS):
             m = designs[DESIGN[b, s]]
-            rest = np.sum(m.bed_weight * np.maximum(m.bed_weight_pressure, 0.0))
-            assert force[b, s] @ uniform == pytest.approx(rest, rel=1e-12)  # rounding of 288 terms
+            total = np.sum(m.bed_weight * np.maximum(m.bed_weight_pressure, 0.0))
+            assert force[b, s] @ uniform == pytest.approx(total, rel=1e-12)  # rounding of 288 terms
     assert force[0, 0] @ uniform == pytest.approx(slab.mass * 9.81, rel=1e-12)
     assert not pressure.any()
 
@@ -212,7 +212,7 @@ def test_void_area_is_exact_wherever_it_lies() -> None:
         x = np.sort(rng.uniform(0.0, length, 2))
         y = np.sort(rng.uniform(-width / 2, width / 2, 2))
         f = rng.uniform(0.0, 2.0)
-        void = MortarVoid(slab=0, x_from=x[0], x_to=x[1], y_from=y[0], y_to=y[1], factor=f)
+        void = MortarVoid(slab=0, x=(x[0], x[1]), y=(y[0], y[1]), factor=f)
         factor = bed_factors(length, width, (n_x, n_y), [void])
         area = np.outer(weight, weight).ravel() * length * width / (4 * n_x * n_y)
         missing = np.sum((1.0 - factor) * area)
@@ -222,9 +222,9 @@ def test_void_area_is_exact_wherever_it_lies() -> None:
 
 def test_voids_side_by_side_are_one_void() -> None:
     """Two voids that touch within a cell equal their union; under a void the factor is 0."""
-    left = MortarVoid(slab=0, x_from=0.5, x_to=2.0, y_from=-1.0, y_to=0.13)
-    right = MortarVoid(slab=0, x_from=0.5, x_to=2.0, y_from=0.13, y_to=1.25)
-    union = MortarVoid(slab=0, x_from=0.5, x_to=2.0, y_from=-1.0, y_to=1.25)
+    left = MortarVoid(slab=0, x=(0.5, 2.0), y=(-1.0, 0.13))
+    right = MortarVoid(slab=0, x=(0.5, 2.0), y=(0.13, 1.25))
+    union = MortarVoid(slab=0, x=(0.5, 2.0), y=(-1.0, 1.25))
     ours = bed_factors(5.6, 2.5, (9, 2), [left, right])
     np.testing.assert_allclose(ours, bed_factors(5.6, 2.5, (9, 2), [union]), atol=10 * ROUNDING)
     inside = bed_factors(5.6, 2.5, (9, 2), [union])[2 * 2 + 1]  # x 1.24...1.87, y 0...1.25
@@ -239,31 +239,31 @@ def test_voids_side_by_side_are_one_void() -> None:
     ("change", "message"),
     [
         ({"slab": -1}, r"void\.slab = -1: must be greater than or equal to 0"),
-        ({"x_to": 0.5}, r"void\.x_to = 0\.5: must be greater than x_from = 1 m"),
-        ({"y_to": -2.0}, r"void\.y_to = -2\.0: must be greater than y_from = -1 m"),
         ({"factor": 11.0}, r"void\.factor = 11\.0: must be less than or equal to 10"),
-        ({"x_from": float("nan")}, r"void\.x_from = nan: "),
+        ({"x": (float("nan"), 2.0)}, r"void\.x\[0\] = nan: "),
     ],
 )
 def test_bad_voids_are_refused(change: dict[str, float], message: str) -> None:
-    table = {"slab": 3, "x_from": 1.0, "x_to": 2.0, "y_from": -1.0, "y_to": 1.0, **change}
+    table = {"slab": 3, "x": (1.0, 2.0), "y": (-1.0, 1.0), **change}
     with pytest.raises(InputError, match=message):
         build(MortarVoid, table, "void")
 
 
 def test_voids_must_fit_their_slab() -> None:
-    """Beyond the slab's end or side, or over another void."""
+    """Turned round, beyond the slab's end or side, or over another void."""
 
-    def void(**change: float) -> MortarVoid:
-        table = {"slab": 7, "x_from": 1.0, "x_to": 2.0, "y_from": -1.0, "y_to": 1.0, **change}
+    def void(**change: tuple[float, float]) -> MortarVoid:
+        table = {"slab": 7, "x": (1.0, 2.0), "y": (-1.0, 1.0), **change}
         return build(MortarVoid, table)
 
-    with pytest.raises(InputError, match=r"slab 7: x_to = 6: must be <= the slab's length, 5\.6 m"):
-        bed_factors(5.6, 2.5, (9, 2), [void(x_to=6.0)])
-    with pytest.raises(InputError, match=r"slab 7: y_to = 1\.3: must be within half the slab's width, 1\.25 m"):
-        bed_factors(5.6, 2.5, (9, 2), [void(y_to=1.3)])
-    with pytest.raises(InputError, match=r"slab 7: x_from = 1\.5: overlaps the void from x = 1 to 2 m"):
-        bed_factors(5.6, 2.5, (9, 2), [void(), void(x_from=1.5, x_to=3.0)])
+    with pytest.raises(InputError, match=r"slab 7\.x = \[1\.0, 6\.0\]: must .* <= 5\.6 m \(the slab's length\)"):
+        bed_factors(5.6, 2.5, (9, 2), [void(x=(1.0, 6.0))])
+    with pytest.raises(InputError, match=r"slab 7\.y = \[-1\.0, 1\.3\]: must .* <= 1\.25 m \(the slab's width\)"):
+        bed_factors(5.6, 2.5, (9, 2), [void(y=(-1.0, 1.3))])
+    with pytest.raises(InputError, match=r"slab 7\.y = \[1\.0, -1\.0\]: must be \[from, to\]"):
+        bed_factors(5.6, 2.5, (9, 2), [void(y=(1.0, -1.0))])
+    with pytest.raises(InputError, match=r"slab 7\.x = \[1\.5, 3\.0\]: overlaps the void from x = 1 to 2 m"):
+        bed_factors(5.6, 2.5, (9, 2), [void(), void(x=(1.5, 3.0))])
 
 
 def test_bad_mortar_is_refused() -> None:

@@ -7,8 +7,9 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.chunk import Chunk
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.kernels import layout as at
 from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes
 from tiengine.model.model import Model
@@ -25,7 +26,7 @@ def model() -> Model:
 
 def test_blocks_are_inverses(model: Model) -> None:
     """Vehicle block against dense algebra; the rails' beyond the bare rail holds springs and dampers only."""
-    train, dt = model.given.train, 1e-4
+    train, dt = model.ingredients.train, 1e-4
     A = train.M + 0.5 * dt * (train.C + V350 * train.C_speed) + 0.25 * dt**2 * train.K
     np.testing.assert_allclose(model.blocks.vehicle.T, la.inv(A), atol=1e-12 * np.abs(la.inv(A)).max())
     for block, (M, C, K) in (
@@ -41,7 +42,7 @@ def test_blocks_are_inverses(model: Model) -> None:
 
 def test_slab_block_is_an_inverse(model: Model) -> None:
     """Slab with bed and its own side of the fastenings."""
-    g, slab, dt = model.given, model.given.designs.matrices[0], 1e-4
+    g, slab, dt = model.ingredients, model.ingredients.designs.matrices[0], 1e-4
     own_K, own_C = seat_inverse_terms(seat_shapes(slab), np.ones((9, 2)), g.fastening, g.rail.half_base)
     rigid = np.zeros(slab.n)
     rigid[: slab.n - 2 : 3] = 1.0
@@ -72,14 +73,14 @@ def rail_period_error(dt: float) -> float:
     A one-mass oscillator in the step's own kernels: the mode is decoupled, and its frequency k sqrt(GK/J) is known.
     """
     model = paper_model(modes=24, V=1e-9, dt=dt, passes=16, seat_factors=lambda first, count: np.zeros((count, 2)))
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     steps = round(5e-3 / dt)
-    chunk = Chunk.empty(model, steps, 1, 1)
-    stepper = Stepper(model, state, chunk)
-    r = model.given.rail
+    chunk = Chunk.empty(model.ingredients, steps, 1, 1)
+    stepper = SineStepper(model, state, chunk)
+    r = model.ingredients.rail
     mode = 7
     omega = (mode + 1) * np.pi / 36.0 * np.sqrt(r.GK / (r.rho * r.I_polar))
-    state.view(at.U, "vehicles")[:, 1 : model.given.train.n_dof : 5] = -1.0  # wheels off the rail
+    state.view(at.U, "vehicles")[:, 1 : model.ingredients.train.n_dof : 5] = -1.0  # wheels off the rail
     torsion = state.view(at.U, "lateral")[0, 0, 48:]
     torsion[mode] = 1e-3
     state.view(at.A, "lateral")[0, 0, 48 + mode] = -(omega**2) * 1e-3

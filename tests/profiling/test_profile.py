@@ -4,27 +4,32 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from threadpoolctl import threadpool_limits
 
 from tiengine.cli.commands import main
+from tiengine.engine.stepper import BETWEEN_STEPS, Stage, Stepper
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
-from tiengine.profiling import product_count as products
 from tiengine.profiling import profile as profiling
 from tiengine.profiling import timed_loop
 from tiengine.profiling.machine import cache_bytes
 from tiengine.profiling.product_count import count_products
 from tiengine.profiling.report import ProfileReport, compare, read_json
 from tiengine.profiling.roofline import Roofs
-from tiengine.profiling.timed_loop import StageTimers, Times
+from tiengine.profiling.timed_loop import StageTimer, Times
 from tiengine.recording.guards import Guard
 from tiengine.result_files.events import Event
 from tiengine.scenario.scenario import load_scenario
+from tiengine.simulation.simulate import run
+from tiengine.simulation.tasks import plan
+from tiengine.simulation.time_loop import Run as Loop
 
 from ..models import V350, Run, paper_model
 
@@ -53,88 +58,120 @@ def test_stages_add_up_to_the_loop(report):
 def test_every_stage_of_the_step_is_reported(report):
     """The stepper's own and those of the loop, in the order of the table."""
     names = [stage.name for stage in report.stages]
-    timers = StageTimers(Run(paper_model(), V350, steps=1, start=False).stepper)
-    assert set(timers.calls) <= set(names)
+    times = Times.of(Run(paper_model(), V350, steps=1, start=False).stepper)
+    assert set(times.calls) <= set(names)
     assert {"window and seats", "irregularity", "suspension", "implicit solve", "contact", "writing"} <= set(names)
-    assert names[-1] == timed_loop.REST
+    assert names[-1] == BETWEEN_STEPS
     assert (report.trains, report.steps, report.passes) == (2, STEPS, 2)
 
 
 def test_percentiles_rise_and_factors_agree(report):
-    """Of the same steps; the two trains share the loop."""
+    """Percentiles of the same steps; the two trains share the loop."""
     loop = report.loop
     assert loop.step_us_p50 <= loop.step_us_p90 <= loop.step_us_p99 <= loop.step_us_max
     assert loop.real_time_factor_per_train == pytest.approx(loop.real_time_factor / 2, rel=ROUNDING)
     assert loop.steps_per_s * loop.real_time_factor * report.time_step_s == pytest.approx(1.0, rel=ROUNDING)
 
 
+class Steps(Stepper):
+    """A step made of given calls."""
+
+    def __init__(self, *stages: Stage) -> None:
+        run = Run(paper_model(), V350, steps=1, start=False)
+        super().__init__(run.model.ingredients, run.state, run.chunk)
+        self._given = stages
+        self.bind()
+
+    def _stages(self) -> Iterator[Stage]:
+        yield from self._given
+
+    def factor(self, V: float) -> None:
+        """Nothing depends on the speed."""
+
+    def finish(self, body_rows: int) -> None:
+        """Nothing is recorded."""
+
+    def compile(self) -> float:
+        """Nothing is compiled."""
+        return 0.0
+
+
 def test_timers_put_every_interval_to_its_stage(monkeypatch):
-    """On a clock that only the stages move: one reading where the name changes, the rest before and after them."""
+    """On a clock that only the stages move: one reading where the name changes, the rest between the steps."""
     now = [0]
 
     def spend(ns: int):
-        return lambda *rest: now.__setitem__(0, now[0] + ns)
+        return lambda *arguments: now.__setitem__(0, now[0] + ns)
 
-    class Fake:
-        stages = (
-            ("rails", spend(3)),
-            ("slabs", spend(5)),
-            ("own", spend(7)),
-            ("contact", spend(11)),
-            ("own", spend(1)),
-        )
-
-        def step(self, *row: int) -> None:
+    def take(stepper: Stepper, rows: list[tuple[int, int, int]]) -> None:
+        for row in rows:
             now[0] += 100
-            for _, stage in self.stages:
-                stage()
+            stepper.step(*row)
             now[0] += 1000
 
     monkeypatch.setattr(timed_loop, "time", SimpleNamespace(perf_counter_ns=lambda: now[0]))
-    fake = Fake()
-    timers, plain = StageTimers(fake), fake.stages
-    times = Times(timers.calls)
-    assert timers.run([(0, -1, -1), (1, -1, -1)], times) == 2 * 1127
-    assert times.stages == {
-        "window and seats": 200, "linear forces": 16, "own": 16, "contact": 22, timed_loop.REST: 2000,
-    }  # fmt: skip
-    assert times.timed == [1127, 1127]
-    assert timers.calls == {"window and seats": 1, "linear forces": 2, "own": 2, "contact": 1}
-    assert fake.stages is plain
+    monkeypatch.setattr(timed_loop, "plain_steps", take)
+    stepper = Steps(("rails", spend(3)), ("slabs", spend(5)), ("own", spend(7)), ("contact", spend(11)))
+    stepper.watch("own", spend(1))
+    times = Times.of(stepper)
+    assert StageTimer(times, 1).take_timed(stepper, [(0, -1, -1), (1, -1, -1)]) == 2 * 1127
+    assert times.stages == {"linear forces": 16, "own": 16, "contact": 22, BETWEEN_STEPS: 2200}
+    assert times.timed == [27, 27]
+    assert times.calls == {"linear forces": 2, "own": 2, "contact": 1}
+    assert (times.timed_steps, times.timed_ns) == (2, 2254)
+    before = now[0]
+    stepper.step(0)
+    assert now[0] - before == 27
+
+
+def test_blocks_take_turns(monkeypatch):
+    """Seven steps in blocks of two: two without timers, two with, two without, one with."""
+    taken: list[tuple[bool, int]] = []
+    stepper = Steps(("own", lambda: taken.append((stepper._mark is not None, stepper.rows.step))))
+    times = Times.of(stepper)
+    StageTimer(times, 2).take(stepper, [(i, -1, -1) for i in range(7)])
+    assert taken == [(i in (2, 3, 6), i) for i in range(7)]
+    assert (times.plain_steps, times.timed_steps, len(times.blocks)) == (4, 3, 2)
 
 
 def test_measuring_changes_no_bit():
     """The same steps with readings and without."""
     model = paper_model()
     watched, bare = (Run(model, V350, steps=20) for _ in range(2))
-    bare.march(20)
-    X = V350 * model.given.newmark.dt * np.arange(1, 21)
+    bare.advance(20)
+    X = V350 * model.ingredients.newmark.dt * np.arange(1, 21)
     watched.stepper.load(X, np.full(20, V350), np.zeros(20), np.zeros_like(watched.chunk.irregularity))
-    timers = StageTimers(watched.stepper)
-    timers.run([(i, i, i) for i in range(20)], Times(timers.calls))
+    StageTimer(Times.of(watched.stepper), 10).take_timed(watched.stepper, [(i, i, i) for i in range(20)])
     np.testing.assert_array_equal(watched.state.motion, bare.state.motion)
     np.testing.assert_array_equal(watched.chunk.wheel, bare.chunk.wheel)
 
 
-def test_counts_of_known_products(monkeypatch):
+def test_the_loop_that_is_measured_is_the_runs_own():
+    """A run with timers in its loop has the bits of one without."""
+    scenario = load_scenario("paper", {"train.distance": 4.0})
+    with run(scenario) as plain:
+        expected = plain.wheel()["normal_force"]
+    (task,) = plan(scenario)
+    timed = Loop.begin(task)
+    timed.timer = StageTimer(Times.of(timed.stepper), 50)
+    with threadpool_limits(1):
+        *chunks, _ = timed.blocks()  # the last holds what the envelopes keep to the end
+    found = np.concatenate([sent.blocks[0]["wheel"].channels["normal_force"] for sent in chunks])
+    np.testing.assert_array_equal(found, expected)
+    assert timed.timer.times.timed_steps == 100
+
+
+def test_counts_of_known_products():
     """(3, 4) (4, 5) twice and (2, 6) (6, 6), by hand."""
-
-    class Fake:
-        def __init__(self, *rest: object) -> None:
-            a, b, c, d = np.ones((3, 4)), np.ones((4, 5)), np.ones((2, 6)), np.ones((6, 6))
-            self.stages = (
-                ("solve", lambda: np.dot(a, b)),
-                ("contact", lambda: None),
-                ("solve", lambda: np.matmul(a, b)),
-                ("seats", lambda: np.matmul(c, d, out=np.empty((2, 6)))),
-            )
-
-        def step(self, i: int) -> None:
-            for _, stage in self.stages:
-                stage()
-
-    monkeypatch.setattr(products, "Stepper", Fake)
-    work = count_products(None, None, None, lambda stepper: None)
+    a, b, c, d = np.ones((3, 4)), np.ones((4, 5)), np.ones((2, 6)), np.ones((6, 6))
+    stepper = Steps(
+        ("solve", lambda: np.dot(a, b)),
+        ("contact", lambda: None),
+        ("solve", lambda: np.matmul(a, b)),
+        ("seats", lambda: np.matmul(c, d, out=np.empty((2, 6)))),
+    )
+    stepper.watch("envelopes", lambda: np.dot(a, b))
+    work = count_products(stepper)
     assert set(work) == {"solve", "seats"}
     solve, seats = work["solve"], work["seats"]
     assert (solve.products, solve.flops, solve.read, solve.traffic) == (2, 2 * 120, 2 * 8 * 32, 2 * 8 * 47)
@@ -146,11 +183,9 @@ def test_counted_solve_is_the_blocks_by_hand():
     model = paper_model("numerics.passes=3", modes=20)
     run = Run(model, V350, steps=1)
 
-    def load(stepper):
-        stepper.load(np.ones(1), np.full(1, V350), np.zeros(1), np.zeros_like(run.chunk.irregularity))
-
-    flops = count_products(model, run.state, run.chunk, load)["solve"].flops
-    n, slots, dofs = model.given.train.n, int(model.dims[at.SLOTS]), int(model.dims[at.SLAB_DOFS])
+    run.stepper.load(np.ones(1), np.full(1, V350), np.zeros(1), np.zeros_like(run.chunk.irregularity))
+    flops = count_products(run.stepper)["solve"].flops
+    n, slots, dofs = model.ingredients.train.n, int(model.dims[at.SLOTS]), int(model.dims[at.SLAB_DOFS])
     slabs, odd = divmod(flops - 3 * 2 * (2 * 40**2 + 2 * 60**2 + n**2), 3 * 2 * slots * dofs)
     assert odd == 0
     assert 0 < slabs <= dofs  # length of the slabs' sums
@@ -265,7 +300,7 @@ def test_bad_input_is_one_line(arguments, message):
     assert result.stderr.count("\n") == 1
 
 
-def test_a_way_too_short_is_refused():
+def test_a_distance_too_short_is_refused():
     """Five metres do not last a second at 350 km/h."""
     with pytest.raises(InputError, match=r"train.distance = 5: too short for the time to measure"):
         profiling.profile(load_scenario("paper", ["train.distance=5"]), seconds=1.0)
@@ -274,6 +309,6 @@ def test_a_way_too_short_is_refused():
 def test_a_run_that_fails_is_told(monkeypatch):
     """A train that derails while it is measured."""
     derailed = Event("derailment", 0.1, 20.0, 1, "left", "wheelset 1 left derailed", True)
-    monkeypatch.setattr(Guard, "look", lambda guard, step, position: guard._report(0, step, derailed))
+    monkeypatch.setattr(Guard, "check", lambda guard, step, position: guard._report(0, step, derailed))
     with pytest.raises(RunFailedError, match="train 0: wheelset 1 left derailed"):
         profiling.profile("paper", steps=2)

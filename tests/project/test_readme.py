@@ -1,11 +1,14 @@
-"""What the README tells a reader to do works as written."""
+"""Examples and commands of the README work as written."""
 
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
+
+from tiengine.parameters.presets import preset_names
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -22,19 +25,27 @@ def test_python_examples_run(capsys):
     assert "(" in capsys.readouterr().out
 
 
-def test_ci_runs_the_test_command():
-    """CI makes the environment itself, then installs and tests with the README's words."""
+def test_ci_installs_and_tests_like_the_readme():
+    """Both install the extra ``test`` and run the suite, CI from a wheel."""
     script = (ROOT / ".ci/run").read_text(encoding="utf-8")
     _, install, test = blocks("sh")[1].strip().split(" && ")
-    assert install.removeprefix(".venv/bin/pip ") in script.replace(" -q", "")
+    assert install == '.venv/bin/pip install -e ".[test]"'
+    assert 'pip install -q "$wheel[test]"' in script
     assert test.removeprefix(".venv/bin/") in script
+
+
+def test_no_speed_is_claimed():
+    """Neither README nor package description says how fast it is; the speed page has the numbers."""
+    description = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["description"]
+    for text in (README, description):
+        assert not re.search(r"faster than|real time", text.lower())
 
 
 @pytest.mark.parametrize(
     "line", [line for block in blocks("sh") for line in block.splitlines() if line.startswith("tiengine")]
 )
 def test_commands_are_understood(line):
-    """Options and scenarios of the examples exist: their help and their names."""
+    """Every option of an example is in its command's help, and every scenario in the library."""
     words = line.split("#")[0].split()
     program = Path(sys.executable).with_name("tiengine")
     done = subprocess.run([program, words[1], "--help"], capture_output=True, text=True, check=False)
@@ -43,4 +54,4 @@ def test_commands_are_understood(line):
         if word.startswith("-"):
             assert word in done.stdout
     if words[1] == "run":
-        assert (ROOT / f"tiengine/library/scenarios/{words[2]}.toml").is_file()
+        assert words[2] in preset_names("scenarios")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.kernels import layout as at
 from tiengine.recording.seat_envelopes import SeatEnvelopes, watched_seats
 from tiengine.recording.slab_envelopes import SlabEnvelopes
@@ -29,28 +29,29 @@ def test_envelopes_are_the_extremes_of_every_step(zone):
     stepper, state = run.stepper, run.state
     envelopes = SeatEnvelopes.of(stepper)
     seen: dict[int, list[NDArray[np.float64]]] = defaultdict(list)
-    first, end = watched_seats(run.model)
-    length, d = run.model.given.length, run.model.given.slab.fastening_pitch
+    first, end = watched_seats(run.model.ingredients)
+    length, d = run.model.ingredients.length, run.model.ingredients.slab.fastening_pitch
 
     def look() -> None:
-        s = stepper.chunk.clock[stepper.asked[0], at.FIRST_SEAT_S] + np.arange(state.seat_force.shape[-1]) * d
+        s = stepper.chunk.clock[stepper.rows.step, at.FIRST_SEAT_S] + np.arange(state.seat_force.shape[-1]) * d
         assert zone <= s[first] < zone + 2.0 * d
         assert length - zone - 2.0 * d < s[end - 1] <= length - zone
         for place in range(first, end):
             seen[state.first_seat + place].append(state.seat_force[0, :, :2, place].copy())
 
-    stepper.stages = (*stepper.stages, ("envelopes", envelopes.watch), ("look", look))
-    run.march(1050)
+    stepper.watch("envelopes", envelopes.watch)
+    stepper.watch("look", look)
+    run.advance(1050)
     none = np.zeros(0)
-    passed, rest = envelopes.blocks(none, none)[0], envelopes.rest()[0]
+    passed, last = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
     assert len(passed.along) == state.first_seat > 25
-    np.testing.assert_array_equal(np.concatenate([passed.along, rest.along]), sorted(seen))
-    np.testing.assert_allclose(np.concatenate([passed.place, rest.place]), (np.array(sorted(seen)) + 0.5) * d)
+    np.testing.assert_array_equal(np.concatenate([passed.along, last.along]), sorted(seen))
+    np.testing.assert_allclose(np.concatenate([passed.chainage, last.chainage]), (np.array(sorted(seen)) + 0.5) * d)
     for extreme, reduce in (("largest", np.max), ("smallest", np.min)):
         for row, kind in enumerate(("vertical", "lateral")):
             name = f"{extreme}_{kind}_force"
             expected = [reduce([force[:, row] for force in seen[seat]], axis=0) for seat in sorted(seen)]
-            np.testing.assert_array_equal(np.concatenate([passed.channels[name], rest.channels[name]]), expected)
+            np.testing.assert_array_equal(np.concatenate([passed.channels[name], last.channels[name]]), expected)
 
 
 def test_after_one_step_the_seats_carry_the_train():
@@ -61,10 +62,10 @@ def test_after_one_step_the_seats_carry_the_train():
     """
     run = Run(paper_model(dt=DT), V350, steps=1)
     envelopes = SeatEnvelopes.of(run.stepper)
-    run.stepper.stages = (*run.stepper.stages, ("envelopes", envelopes.watch))
-    run.march(1)
-    channels = envelopes.rest()[0].channels
-    train = run.model.given.train
+    run.stepper.watch("envelopes", envelopes.watch)
+    run.advance(1)
+    channels = envelopes.remainder()[0].channels
+    train = run.model.ingredients.train
     weight = train.gravity[1 : train.n_dof : 5].sum()
     np.testing.assert_array_equal(channels["largest_vertical_force"], channels["smallest_vertical_force"])
     assert channels["largest_vertical_force"].sum() == pytest.approx(weight, rel=1e-4)
@@ -78,9 +79,13 @@ def test_slabs_against_their_coordinates(mortar):
     """Deflection at nodes and seats, moments and pressures of every sample of the bodies."""
     run = Run(paper_model(f'numerics.mortar="{mortar}"', dt=DT), V350, steps=500)
     scenario = load_scenario("paper")
-    stepper, slab = run.stepper, run.model.given.slab
+    stepper, slab = run.stepper, run.model.ingredients.slab
     envelopes = SlabEnvelopes.of(scenario, stepper)
-    operator, slots, sound = moment_operator(slab), run.model.given.slots, run.model.given.designs.matrices[0]
+    operator, slots, sound = (
+        moment_operator(slab),
+        run.model.ingredients.slots,
+        run.model.ingredients.designs.matrices[0],
+    )
     seen: dict[int, list[tuple[float, ...]]] = defaultdict(list)
     held: list[int] = []
 
@@ -96,14 +101,15 @@ def test_slabs_against_their_coordinates(mortar):
             w = np.append(u[: slab.plate_dofs : 3], under_seats)
             seen[number].append((w.max(), *moments.max(axis=1), w.min(), *moments.min(axis=1)))
 
-    stepper.stages = (*stepper.stages, ("envelopes", envelopes.watch), ("look", look))
-    run.march(500)
-    stepper.fill_pressures(500)
+    stepper.watch("envelopes", envelopes.watch)
+    stepper.watch("look", look)
+    run.advance(500)
+    stepper.finish(500)
     none = np.zeros(0)
-    passed, rest = envelopes.blocks(none, none)[0], envelopes.rest()[0]
+    passed, last = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
     assert len(passed.along) == run.state.first_slab > 0
-    numbers = np.concatenate([passed.along, rest.along])
-    found = {name: np.concatenate([passed.channels[name], rest.channels[name]]) for name in passed.channels}
+    numbers = np.concatenate([passed.along, last.along])
+    found = {name: np.concatenate([passed.channels[name], last.channels[name]]) for name in passed.channels}
     np.testing.assert_array_equal(numbers, sorted(seen))
     for i, name in enumerate(("deflection", "moment_x", "moment_y")):
         expected = [(max(row[i] for row in seen[k]), min(row[3 + i] for row in seen[k])) for k in sorted(seen)]
@@ -120,35 +126,36 @@ def test_slabs_against_their_coordinates(mortar):
 
 
 def test_what_is_kept_can_be_saved_and_restored():
-    """A march that is left in the middle and taken up by another stepper ends with the same envelopes."""
+    """A run that stops halfway and is continued by another stepper ends with the same envelopes."""
     none = np.zeros(0)
 
     def watched(run: Run) -> list[Any]:
         watchers = [SeatEnvelopes.of(run.stepper), SlabEnvelopes.of(load_scenario("paper"), run.stepper)]
-        run.stepper.stages = (*run.stepper.stages, *(("envelopes", each.watch) for each in watchers))
+        for each in watchers:
+            run.stepper.watch("envelopes", each.watch)
         return watchers
 
     def give_out(run: Run, watchers: list[Any]) -> list[Any]:
-        run.stepper.fill_pressures(150)
+        run.stepper.finish(150)
         return [each.blocks(none, none)[0] for each in watchers]
 
     model = paper_model(dt=DT)
     whole = Run(model, V350, steps=150)
     kept = watched(whole)
-    whole.march(150)
+    whole.advance(150)
     give_out(whole, kept)
     saved, state = [deepcopy(each.saved()) for each in kept], deepcopy(whole.state)
-    whole.march(150)
-    expected = give_out(whole, kept) + [each.rest()[0] for each in kept]
+    whole.advance(150)
+    expected = give_out(whole, kept) + [each.remainder()[0] for each in kept]
 
     half = Run(model, V350, X=whole.X - 150 * V350 * DT, steps=150, start=False)
     half.state = state
-    half.stepper = Stepper(model, state, half.chunk)
+    half.stepper = SineStepper(model, state, half.chunk)
     others = watched(half)
     for each, values in zip(others, saved, strict=True):
         each.restore(values)
-    half.march(150)
-    found = give_out(half, others) + [each.rest()[0] for each in others]
+    half.advance(150)
+    found = give_out(half, others) + [each.remainder()[0] for each in others]
     assert sum(len(block.along) for block in found) > 60
     for mine, theirs in zip(expected, found, strict=True):
         np.testing.assert_array_equal(mine.along, theirs.along)

@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
 from tiengine.recording.gauge_samples import RailPlace, SlabPlace
@@ -24,7 +24,7 @@ SEAT = {"name": "c", "on": "fastening", "chainage": 20.0, "side": "right"}
 @pytest.mark.parametrize(
     ("gauges", "message"),
     [
-        ([RAIL, RAIL | {"side": "right"}], r"gauges\[1\].name = 'a': gauges\[0\] has this name already"),
+        ([RAIL, RAIL | {"side": "right"}], r"gauges\[1\].name = 'a': gauges\[0\] already has this name"),
         ([RAIL | {"name": "a b"}], r"gauges\[0\].name = 'a b': must be made of letters, digits, _ and -"),
         ([RAIL | {"name": ""}], r"gauges\[0\].name = '': must be made of"),
         ([RAIL | {"name": "../x"}], r"gauges\[0\].name = '../x': must be made of"),
@@ -32,10 +32,10 @@ SEAT = {"name": "c", "on": "fastening", "chainage": 20.0, "side": "right"}
         ([RAIL | {"chainage": -1.0}], r"gauges\[0\].chainage = -1.0: must be greater than or equal to 0 m"),
         ([RAIL | {"chainage": 1e3}], r"gauges\[0\].chainage = 1000: must be between 0 and 38 m"),
         ([RAIL | {"side": None}], r"gauges\[0\].side: missing; a gauge on a rail needs 'left' or 'right'"),
-        ([RAIL | {"y": 0.1}], r"gauges\[0\].y = 0.1: only a gauge on a slab has it"),
+        ([RAIL | {"y": 0.1}], r"gauges\[0\].y = 0.1: only for a gauge on a slab"),
         ([SEAT | {"side": "up"}], r"gauges\[0\].side = 'up': must be 'left' or 'right'"),
         ([SLAB | {"side": "left"}], r"gauges\[0\].side = 'left': a gauge on a slab has y instead"),
-        ([SLAB | {"y": None}], r"gauges\[0\].y: missing; a gauge on a slab needs its place"),
+        ([SLAB | {"y": None}], r"gauges\[0\].y: missing; a gauge on a slab needs its distance"),
         ([SLAB | {"y": 1.3}], r"gauges\[0\].y = 1.3: must be within half the slab's width, 1.25 m"),
         ([SLAB | {"y": float("nan")}], r"gauges\[0\].y = nan: must be a finite number"),
         ([SLAB | {"chainage": 17.02}], r"gauges\[0\].chainage = 17.02: lies in a joint; must be on a slab, number 3"),
@@ -78,7 +78,7 @@ def test_a_place_of_the_rail_moves_with_the_material():
     """
     model = paper_model()
     n, V, V_rate = 25, 20.0, -2000.0
-    state, chainage, start = State.at_rest(model), 12.3, 1.7
+    state, chainage, start = SineState.at_rest(model), 12.3, 1.7
     random = np.random.default_rng(5)
     motion = random.standard_normal((3, 2, n)) * np.array([1.0, 30.0, 900.0])[:, None, None]
     for row, values in zip((at.U, at.V, at.A), motion, strict=True):
@@ -90,22 +90,22 @@ def test_a_place_of_the_rail_moves_with_the_material():
         q = motion[0] + motion[1] * t + motion[2] * t**2 / 2.0
         return q @ np.sin(k * (chainage - start - V * t - V_rate * t**2 / 2.0))
 
-    found = RailPlace(model, state, chainage, 1).read(start, V, V_rate)
+    found = RailPlace(state, model.ingredients.length, chainage, 1).read(start, V, V_rate)
     assert found is not None
     h = 1e-5
     behind, now, ahead = (displacement(t) for t in (-h, 0.0, h))
     np.testing.assert_allclose(found[0, 0], now, rtol=1e-12)
     np.testing.assert_allclose(found[1, 0], (ahead - behind) / (2.0 * h), rtol=1e-6)
     np.testing.assert_allclose(found[2, 0], (ahead - 2.0 * now + behind) / h**2, rtol=1e-6)
-    other = RailPlace(model, state, chainage, 0).read(start, V, V_rate)
+    other = RailPlace(state, model.ingredients.length, chainage, 0).read(start, V, V_rate)
     assert other is not None
     assert not other.any()
 
 
 def test_a_rail_place_is_read_inside_the_window_only():
     model = paper_model()
-    state, length = State.at_rest(model), model.given.length
-    place = RailPlace(model, state, 40.0, 0)
+    state, length = SineState.at_rest(model), model.ingredients.length
+    place = RailPlace(state, length, 40.0, 0)
     assert place.read(40.0 - length - 1e-6, 90.0, 0.0) is None
     assert place.read(40.0 - length + 1e-6, 90.0, 0.0) is not None
     assert place.read(40.0 - 1e-6, 90.0, 0.0) is not None
@@ -115,7 +115,7 @@ def test_a_rail_place_is_read_inside_the_window_only():
 def test_a_place_of_a_slab_moves_with_its_plate_and_its_rigid_motion():
     """A plane w = 1 + 2 x + 3 y is in the element's shapes; laterally y + psi x, x from the slab's centre."""
     model = paper_model()
-    slab, state = model.given.slab, State.at_rest(model)
+    slab, state = model.ingredients.slab, SineState.at_rest(model)
     state.first_slab = 3
     x, y = 1.1, -0.4
     chainage = 4.5 * slab.pitch + x  # on slab 4
@@ -127,8 +127,8 @@ def test_a_place_of_a_slab_moves_with_its_plate_and_its_rigid_motion():
     w = 1.0 + 2.0 * nodes[0] + 3.0 * nodes[1]
     plane = np.stack([w, np.full_like(w, 2.0), np.full_like(w, 3.0)], axis=-1).ravel()
     for row, factor in ((at.U, 1.0), (at.V, 10.0), (at.A, 100.0)):
-        state.view(row, "slabs")[0, 4 % model.given.slots] = factor * np.append(plane, [0.5, 0.25])
-    place = SlabPlace(model, state, chainage, y)
+        state.view(row, "slabs")[0, 4 % model.ingredients.slots] = factor * np.append(plane, [0.5, 0.25])
+    place = SlabPlace(state, model.ingredients, chainage, y)
     found = place.read(chainage - 10.0, 90.0, 0.0)
     assert found is not None
     expected = np.array([0.5 + 0.25 * x, 1.0 + 2.0 * x + 3.0 * y])

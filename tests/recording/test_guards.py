@@ -1,13 +1,14 @@
-"""What goes wrong is seen within a millisecond, named, and written down."""
+"""Faults of the physics are found within a millisecond, named, and written to the file."""
 
 from __future__ import annotations
-
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from tiengine.engine.state import State
+from tiengine.engine.chunk import Chunk
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.stepper import Rows
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import SHIFT
 from tiengine.parameters.errors import InputError, RunFailedError
@@ -16,24 +17,24 @@ from tiengine.scenario.event_policy import Events
 from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.simulation import simulate
 
-from ..reference.marching import model_of
+from ..reference.stepping import model_of
 
 STEP = 2e-4
 
 
 @pytest.fixture
 def guard() -> Guard:
-    """Looks at one train at rest, all wheels loaded; the model is shared by the tests."""
+    """Checks one train at rest, all wheels loaded; the model is shared by the tests."""
     return guard_of(Events())
 
 
 def guard_of(policy: Events, track_end: float = np.inf) -> Guard:
     model = model_of("smooth", "numerics.modes_per_metre=2", dt=STEP)
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     state.enter(model, 0, 0)
     state.force[..., 0] = 7e4
-    stepper = SimpleNamespace(model=model, state=state, stages=(), asked=(0, -1, -1))
-    return Guard.beside(stepper, policy, np.full(1, track_end))
+    stepper = SineStepper(model, state, Chunk.empty(model.ingredients, 1, 1, 1))
+    return Guard.watching(stepper, policy, np.full(1, track_end))
 
 
 def only(guard: Guard):
@@ -44,20 +45,20 @@ def only(guard: Guard):
 
 
 def test_nothing_is_said_of_a_train_at_rest(guard: Guard):
-    guard.look(5, 100.0)
+    guard.check(5, 100.0)
     assert guard.take() == {}
     assert guard.stopped == {}
 
 
-def test_it_looks_every_millisecond_and_after_the_last_step(guard: Guard, monkeypatch: pytest.MonkeyPatch):
+def test_it_checks_every_millisecond_and_after_the_last_step(guard: Guard, monkeypatch: pytest.MonkeyPatch):
     """Five steps of 0.2 ms; a chunk of 12 steps after 1000."""
-    looked = []
-    monkeypatch.setattr(guard, "look", lambda step, position: looked.append((step, position)))
+    checked = []
+    monkeypatch.setattr(guard, "check", lambda step, position: checked.append((step, position)))
     guard.load(1000, np.arange(12.0))
     for i in range(12):
-        guard.stepper.asked = (i, -1, -1)
+        guard.stepper.rows = Rows(i)
         guard.watch_step()
-    assert looked == [(1005, 4.0), (1010, 9.0), (1012, 11.0)]
+    assert checked == [(1005, 4.0), (1010, 9.0), (1012, 11.0)]
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e30], ids=["nan", "infinite", "huge"])
@@ -74,7 +75,7 @@ def test_it_looks_every_millisecond_and_after_the_last_step(guard: Guard, monkey
 def test_numbers_that_run_away_end_a_train(guard: Guard, block: str, index: tuple[int, ...], words: str, value: float):
     """The field is named; the train is taken out of the way."""
     guard.state.view(at.V, block)[index] = value
-    guard.look(10, 42.0)
+    guard.check(10, 42.0)
     event = only(guard)
     assert event.kind == "runaway"
     assert event.stops
@@ -84,18 +85,18 @@ def test_numbers_that_run_away_end_a_train(guard: Guard, block: str, index: tupl
     assert "(t = 0.0020 s, chainage 42.00 m)" in str(event)
     assert "numerics.time_step = 0.0001" in str(event)
     assert not guard.state.motion[: at.A + 1].any()
-    guard.look(15, 42.1)
+    guard.check(15, 42.1)
     assert guard.take() == {}
 
 
 def test_a_wheel_that_stays_off_its_rail_is_noted_once(guard: Guard):
-    """50 ms without load, seen at the fiftieth look; it stays one event while it lasts."""
+    """50 ms without load, seen at the fiftieth check; it stays one event while it lasts."""
     guard.state.force[0, 2, 1, 0] = 0.0
-    for look in range(1, 50):
-        guard.look(5 * look, 10.0)
+    for check in range(1, 50):
+        guard.check(5 * check, 10.0)
     assert guard.take() == {}
-    for look in range(50, 80):
-        guard.look(5 * look, 10.0)
+    for check in range(50, 80):
+        guard.check(5 * check, 10.0)
     event = only(guard)
     assert (event.kind, event.wheelset, event.side, event.stops) == ("wheel_lift", 3, "right", False)
     assert event.time == pytest.approx(0.05, abs=1e-9)
@@ -106,21 +107,21 @@ def test_a_flight_that_ends_in_time_is_no_event(guard: Guard):
     """40 ms off, then loaded, then 40 ms off again."""
     for load in (0.0, 7e4, 0.0):
         guard.state.force[0, 0, 0, 0] = load
-        for look in range(1 if load else 40):
-            guard.look(5 * (look + 1), 10.0)
+        for check in range(1 if load else 40):
+            guard.check(5 * (check + 1), 10.0)
     assert guard.take() == {}
 
 
 def test_climbing_and_derailing(guard: Guard):
     """The flange first, the end of the profile next; the latter ends the train."""
-    climb = climbing_shift(guard.model.given.contact)
+    climb = climbing_shift(guard.stepper.ingredients.contact)
     assert 11.5e-3 < climb < 12.5e-3  # LMA on CHN60: the flank of 70 degrees ends at 12.1 mm (contact table)
     guard.state.contact[0, 1, 0, SHIFT] = climb + 1e-4
-    guard.look(5, 10.0)
+    guard.check(5, 10.0)
     event = only(guard)
     assert (event.kind, event.wheelset, event.side, event.stops) == ("flange_climb", 2, "left", False)
     guard.state.contact[0, 1, 0, SHIFT] = 14e-3
-    guard.look(10, 10.1)
+    guard.check(10, 10.1)
     event = only(guard)
     assert (event.kind, event.stops) == ("derailment", True)
     assert guard.stopped == {0: 10}
@@ -130,26 +131,26 @@ def test_the_scenario_decides(guard: Guard):
     """A derailment that is only recorded, a climb that stops."""
     guard = guard_of(Events(derailment="record", flange_climb="stop"))
     guard.state.contact[0, 0, 0, SHIFT] = 12.4e-3
-    guard.look(5, 1.0)
+    guard.check(5, 1.0)
     assert only(guard).stops
     guard = guard_of(Events(derailment="record"))
     guard.state.contact[0, 0, 0, SHIFT] = 14e-3
-    guard.look(5, 1.0)
+    guard.check(5, 1.0)
     assert {event.kind: event.stops for event in guard.take()[0]} == {"flange_climb": False, "derailment": False}
     assert guard.stopped == {}
 
 
 def test_the_end_of_a_measured_track(guard: Guard):
     """Noted once, when the leading wheel comes to it, 11.25 m ahead of the centre."""
-    front = float(guard.model.given.train.wheelset_x.max())
+    front = float(guard.stepper.ingredients.train.wheelset_x.max())
     guard = guard_of(Events(), track_end=50.0)
-    guard.look(5, 50.0 - front - 0.01)
+    guard.check(5, 50.0 - front - 0.01)
     assert guard.take() == {}
-    guard.look(10, 50.0 - front + 0.01)
+    guard.check(10, 50.0 - front + 0.01)
     event = only(guard)
     assert event.kind == "track_end"
     assert "ends at chainage 50.00 m" in event.words
-    guard.look(15, 60.0)
+    guard.check(15, 60.0)
     assert guard.take() == {}
 
 
@@ -169,9 +170,9 @@ def short(**changes: object) -> Scenario:
 def test_events_are_in_the_file_and_samples_end_with_them(tmp_path):
     """A hundred times the track's roughness: the train derails; nothing is written beyond that instant."""
     path = tmp_path / "run.h5"
-    told: list[str] = []
+    notes: list[str] = []
     with pytest.raises(RunFailedError, match=r"derailed|ran away"):
-        simulate.run(short(irregularity__scale=100.0), path, tell=told.append)
+        simulate.run(short(irregularity__scale=100.0), path, notify=notes.append)
     with simulate.open_result(path) as result:
         events = result.group("events")
         last = events["time"][-1]
@@ -181,9 +182,9 @@ def test_events_are_in_the_file_and_samples_end_with_them(tmp_path):
         for group in ("wheel", "body"):
             time = result.group(group)["time"]
             assert last - 1.001e-3 <= time[-1] <= last + 1e-12
-        assert np.isfinite(result.wheel()["normal_force"][:-5]).all()  # a look is at most five steps late
-    assert told
-    assert str(told[-1]).startswith(str(events["message"][-1]))
+        assert np.isfinite(result.wheel()["normal_force"][:-5]).all()  # a check is at most five steps late
+    assert notes
+    assert str(notes[-1]).startswith(str(events["message"][-1]))
 
 
 def test_a_measured_track_that_is_never_reached_is_refused(tmp_path):
@@ -193,7 +194,7 @@ def test_a_measured_track_that_is_never_reached_is_refused(tmp_path):
     file = tmp_path / "track.csv"
     file.write_text("distance [m],vertical_left [m],vertical_right [m],alignment_left [m],alignment_right [m]\n" + rows)
     with pytest.raises(
-        InputError, match=r"irregularity\.file: begins at chainage 900 m: must be before the end of the way"
+        InputError, match=r"irregularity\.file: begins at chainage 900 m: must be before the end of the run"
     ):
         simulate.run(short(irregularity__file=str(file)), tmp_path / "run.h5")
     assert list(tmp_path.iterdir()) == [file]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-COMMAND = (sys.executable, "-c", "from tiengine.cli import main; main()")
+COMMAND = (sys.executable, "-c", "from tiengine.cli.commands import main; main()")
 
 
 def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -15,7 +15,7 @@ from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import KINDS, find_preset, preset_names, preset_source
 from tiengine.scenario.overrides import parse_value
 from tiengine.scenario.scenario import check_wavelength, load_scenario, to_toml
-from tiengine.track.defects import FailedFastenings, MortarDefect, fastening_factors
+from tiengine.track.defects import FailedFastenings, fastening_factors
 from tiengine.vehicle.vehicle import load_vehicle
 
 TRAIN = {"vehicles": ["CRH380A_v2"], "speed_kmh": 300.0, "distance": 100.0}
@@ -206,7 +206,7 @@ BAD = {
     # between keys
     "numerics.window=20": "numerics.window = 20: window shorter than the train; must be at least 24 m",
     "numerics.absorbing_zone=7": "numerics.absorbing_zone = 7: must be at most 6 m in this window",
-    "train.coupler_pitch=[20.0]": "train.coupler_pitch = [20.0]: must be one number or 0, one a coupling",
+    "train.coupler_pitch=[20.0]": "train.coupler_pitch = [20.0]: must be one number or 0, one per coupling",
     "irregularity.spectrum=german_lo": "irregularity.spectrum = 'german_lo': unknown; did you mean",
     "irregularity.wavelength_max=0.5": "irregularity.wavelength_m",
     "track.failed_fastenings=[{seats=[3, 2]}]": "seats = [3, 2]: must be [first, last] with first <= last",
@@ -258,7 +258,7 @@ def test_bad_files(tmp_path: Path):
 def test_preset_like_itself_is_refused():
     """A circle of presets ends in a message, not in recursion."""
     presets = {"rails": {"a": {"like": "b"}, "b": {"like": "a"}}}
-    assert "is like itself" in refusal({"train": TRAIN, "track": {"rail": "a"}, "presets": presets})
+    assert "is defined in terms of itself" in refusal({"train": TRAIN, "track": {"rail": "a"}, "presets": presets})
 
 
 def test_wavelength_limit_is_eight_steps():
@@ -308,19 +308,6 @@ def test_fastening_factors():
     np.testing.assert_array_equal(fastening_factors(rows, 0, 10), expected)
     for first, count in ((0, 3), (3, 4), (5, 5), (8, 2)):
         np.testing.assert_array_equal(fastening_factors(rows, first, count), expected[first : first + count])
-
-
-def test_mortar_void_rectangle():
-    """The scenario's pairs become the edges of the slab's void."""
-    void = MortarDefect(slab=3, x=(1.0, 1.65), y=(-1.25, 0.5), factor=0.1).rectangle
-    assert (void.slab, void.x_from, void.x_to, void.y_from, void.y_to, void.factor) == (
-        3,
-        1.0,
-        1.65,
-        -1.25,
-        0.5,
-        0.1,
-    )
 
 
 def test_no_tension_of_the_track_reaches_the_mortar():

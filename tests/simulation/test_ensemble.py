@@ -106,7 +106,7 @@ def test_keys_may_be_written_without_quotes():
 
 
 def test_measured_files_are_found_beside_the_scenario(tmp_path):
-    """As the key itself is."""
+    """Relative paths are resolved as for the key itself."""
     (tmp_path / "many.toml").write_text(
         '[train]\nvehicles = ["CRH380A_v2"]\nspeed_kmh = 100.0\ndistance = 10.0\n[ensemble]\nsize = 2\n'
         '[ensemble.vary]\n"irregularity.file" = ["a.csv", "b.csv"]\n'
@@ -119,7 +119,7 @@ def test_measured_files_are_found_beside_the_scenario(tmp_path):
     ("settings", "message"),
     [
         ({"size": 0}, "ensemble.size = 0: must be greater than or equal to 1"),
-        ({"size": 2, "seeds": [1]}, r"ensemble.seeds = \[1\]: must be one seed a train, 2"),
+        ({"size": 2, "seeds": [1]}, r"ensemble.seeds = \[1\]: must be one seed per train, 2"),
         ({"size": 2, "seeds": [1, -1]}, r"ensemble.seeds\[1\] = -1: must be"),
         ({"size": 2, "vary": {"train.speed_kmh": [300.0] * 3}}, "'train.speed_kmh' has 3 values: must be as many"),
         ({"size": 2, "vary": {"train.speed_kmh": []}}, "'train.speed_kmh' has 0 values"),
@@ -130,8 +130,11 @@ def test_measured_files_are_found_beside_the_scenario(tmp_path):
         ({"size": 2, "vary": {"output.precision": ["single", "double"]}}, "'output.precision' cannot vary"),
         ({"size": 2, "vary": {"ensemble.size": [1, 2]}}, "'ensemble.size' cannot vary"),
         ({"size": 2, "vary": {"numerics.threads": [1, 2]}}, "'numerics.threads' cannot vary"),
-        ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.seed": [1, 2]}}, "'irregularity.seed' cannot vary where"),
-        ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.spectrum": ["none"]}}, "ensemble.seeds: make no differ"),
+        ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.seed": [1, 2]}}, "'irregularity.seed' cannot vary if"),
+        (
+            {"size": 2, "seeds": [1, 2], "vary": {"irregularity.spectrum": ["none"]}},
+            "ensemble.seeds: no effect without",
+        ),
     ],
 )
 def test_bad_input_names_the_train_and_the_key(settings, message):
@@ -183,7 +186,7 @@ def test_each_train_is_the_single_run_of_its_own_scenario():
 
 
 def test_file_of_an_ensemble():
-    """What holds for all trains stands at the root, what for one at its group."""
+    """Facts of all trains are at the root, those of one train at its group."""
     many = mixed()
     root, facts = many.attributes, [many.facts(train) for train in range(6)]
     assert (root["status"], root["trains"], many.failures) == ("complete", 6, {})
@@ -196,7 +199,7 @@ def test_file_of_an_ensemble():
 
 
 def test_defects_of_one_train():
-    """A missing row of fastenings under the first wheels is felt by the train that has it alone."""
+    """A missing row of fastenings under the first wheels affects only the train that has it."""
     failed = [[], [{"seats": [36, 40]}]]  # chainage 23 to 25.5 m, where the leading wheelset starts at 24 m
     scenario = ensemble(size=2, seeds=[5, 5], vary={"track.failed_fastenings": failed})
     with simulate.run(scenario, workers=1) as both:
@@ -287,13 +290,13 @@ def test_the_trains_of_a_killed_worker_are_begun_again():
             killed.append(int(multiprocessing.active_children()[0].pid or 0))
             os.kill(killed[0], signal.SIGKILL)
 
-    told: list[str] = []
-    with simulate.run(ensemble(**MIXED), workers=2, progress=kill, tell=told.append) as result:
+    notes: list[str] = []
+    with simulate.run(ensemble(**MIXED), workers=2, progress=kill, notify=notes.append) as result:
         assert not result.failures
         for train in range(6):
             assert_same_bits(result, mixed(), train)
-    # nothing is told if the killed one had sent all it had to
-    assert told in ([], ["a worker died (killed by SIGKILL); its 2 trains are begun again"])
+    # no note if the killed one had sent everything
+    assert notes in ([], ["a worker died (killed by SIGKILL); its 2 trains are started again"])
     assert multiprocessing.active_children() == []
 
 

@@ -9,13 +9,13 @@ import pytest
 import xarray
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.engine.static_track import StaticTrack
 from tiengine.kernels import layout as at
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation import simulate
 
-from ..reference.marching import KMH, March, march, model_of
+from ..reference.stepping import KMH, History, model_of, run_steps
 
 SPEED = 350.0 * KMH
 SEAT_PITCH, SLAB_PITCH = 0.63, 5.67
@@ -27,23 +27,23 @@ FEW_MODES = ("numerics.modes_per_metre=2", 'numerics.truncation="none"')
 
 
 @pytest.fixture(scope="module")
-def smooth() -> tuple[March, NDArray[np.float64]]:
+def smooth() -> tuple[History, NDArray[np.float64]]:
     """One second on the smooth track, and the balance of forces of every rail; see ``balanced``."""
     return balanced("smooth", "numerics.window=36", *FEW_MODES, duration=1.0)
 
 
-def balanced(name: str, *overrides: str, duration: float) -> tuple[March, NDArray[np.float64]]:
-    """A march at 2e-4 s with, per step, the sum of fastening forces and the inertia of each rail.
+def balanced(name: str, *overrides: str, duration: float) -> tuple[History, NDArray[np.float64]]:
+    """A run at 2e-4 s with, per step, the sum of fastening forces and the inertia of each rail.
 
     The material momentum of a rail is m int (dw/dt - V w') ds; its w vanishes at both ends, so its rate is
     m sum_i a_i (1 - cos i pi) / k_i. What the pinned ends carry is left out of the balance.
 
     Returns:
-        The march, and forces [N], shape (steps, fastenings or inertia, vertical or lateral, rail).
+        Its history, and forces [N], shape (steps, fastenings or inertia, vertical or lateral, rail).
     """
     model = model_of(name, *overrides, dt=2e-4)
-    k, n = model.window.wave_numbers, model.given.modes
-    whole = model.given.rail.mass_per_length * (1.0 - np.cos(k * model.given.length)) / k
+    k, n = model.window.wave_numbers, model.ingredients.modes
+    whole = model.ingredients.rail.mass_per_length * (1.0 - np.cos(k * model.ingredients.length)) / k
     rows = []
 
     def each(_: int, stepper) -> None:
@@ -52,7 +52,7 @@ def balanced(name: str, *overrides: str, duration: float) -> tuple[March, NDArra
         inertia = [state.view(at.A, block)[0, :, :n] @ whole for block in ("vertical", "lateral")]
         rows.append([fastenings, inertia])
 
-    run = march(name, *overrides, dt=2e-4, duration=duration, model=model, each=each)
+    run = run_steps(name, *overrides, dt=2e-4, duration=duration, model=model, each=each)
     return run, np.array(rows)
 
 
@@ -62,7 +62,7 @@ def test_smooth_track_settles_to_the_static_load(smooth):
     0.01 % for a mean over a number of steps that is not exactly one of slabs.
     """
     run, _ = smooth
-    train = run.model.given.train
+    train = run.model.ingredients.train
     weight = train.gravity[1 : train.n_dof : 5].sum()
     whole_slabs = round(10 * SLAB_PITCH / SPEED / 2e-4)
     np.testing.assert_allclose(run.vertical[-whole_slabs:].mean(axis=0), weight / 8.0, rtol=1e-4)
@@ -92,7 +92,7 @@ def test_ripple_has_the_size_of_the_tracks_contrast(smooth):
     """
     run, _ = smooth
     model = run.model
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     deflection = []
     for X in np.linspace(0.5 * SEAT_PITCH, 1.5 * SEAT_PITCH, 8, endpoint=False):
         state.enter(model, 1, 0)
@@ -140,8 +140,8 @@ def test_fastenings_and_inertia_carry_the_wheels_on_a_rough_track():
 
 def test_wheels_carry_the_train_and_its_inertia():
     """Newton's law for all bodies together, vertically and laterally, at every step: rounding only."""
-    run = march("default", dt=2e-4, duration=0.4)
-    train = run.model.given.train
+    run = run_steps("default", dt=2e-4, duration=0.4)
+    train = run.model.ingredients.train
     mass, weight = np.diag(train.M)[: train.n_dof], train.gravity[1 : train.n_dof : 5].sum()
     acceleration = run.body[:, 2]
     down = acceleration[:, 1::5] @ mass[1::5]
@@ -195,17 +195,17 @@ def test_forces_have_the_expected_size(file):
 
 
 def test_two_ways_of_reading_agree(file):
-    """``tiengine.open`` and the irregularity that the wheels felt."""
+    """``tiengine.open`` and the irregularity under the wheels."""
     import tiengine
     from tiengine.irregularity.irregularity import at_wheels, make_irregularity
 
     with tiengine.open(file) as result:
-        felt, wheel = result.irregularity(), result.wheel()
+        irregularity, wheel = result.irregularity(), result.wheel()
         scenario = result.scenario
         assert result.attributes["status"] == "complete"
-    assert set(felt) >= {"time", "vertical", "lateral"}
+    assert set(irregularity) >= {"time", "vertical", "lateral"}
     lead = 18.0 + float(wheel["wheelset_offset"].max())
     track = make_irregularity(scenario.irregularity, lead)
     rails = at_wheels(track.sample(wheel["position"][::100, None] + wheel["wheelset_offset"]))
-    np.testing.assert_allclose(felt["vertical"][::100], rails[..., 0], atol=1e-9)  # single precision of 5 mm
-    np.testing.assert_allclose(felt["lateral"][::100], rails[..., 1], atol=1e-9)
+    np.testing.assert_allclose(irregularity["vertical"][::100], rails[..., 0], atol=1e-9)  # single precision of 5 mm
+    np.testing.assert_allclose(irregularity["lateral"][::100], rails[..., 1], atol=1e-9)

@@ -7,7 +7,8 @@ import pytest
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State, positions
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset
@@ -172,13 +173,13 @@ def test_energy_of_free_motion() -> None:
 
 
 def test_step_against_host() -> None:
-    """What a step has for C v + K u is that of the sparse matrices; two trains, speed changing.
+    """C v + K u of the step equals that of the sparse matrices; two trains, speed changing.
 
     Rails: the force. Slabs and trains: the acceleration, that is after the implicit operator.
     """
     model = paper_model(modes=24, trains=2)
-    state, g = State.at_rest(model), model.given
-    clock = positions(model, np.array([33.3]), np.array([V350]), np.array([V_RATE])).clock
+    state, g = SineState.at_rest(model), model.ingredients
+    clock = window_clock(model.ingredients.slab, np.array([33.3]), np.array([V350]), np.array([V_RATE]))
     state.enter(model, int(clock[0, at.FIRST_SEAT]), int(clock[0, at.FIRST_SLAB]))
     rng = np.random.default_rng(3)
     state.motion[at.U_PREDICTED] = 1e-3 * rng.standard_normal(state.motion.shape[1])

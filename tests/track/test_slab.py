@@ -9,10 +9,11 @@ import pytest
 import scipy.linalg
 from numpy.typing import NDArray
 
+from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import build
 from tiengine.track.mortar import Mortar, MortarVoid
-from tiengine.track.slab import GRAVITY, Slab, load_slab, slab_names
+from tiengine.track.slab import Slab, load_slab, slab_names
 from tiengine.track.slab_matrices import SlabMatrices, slab_designs, slab_matrices
 from validation.closed_forms.plate_ritz import frequencies
 
@@ -58,8 +59,8 @@ def matrices(slab_and_mortar: tuple[Slab, Mortar]) -> SlabMatrices:
 def test_designs_keep_their_own_bed(slab_and_mortar: tuple[Slab, Mortar]) -> None:
     """Built together or alone, a design is the same to the last bit; voids do not touch the plate."""
     voids = [
-        MortarVoid(slab=3, x_from=1.0, x_to=2.0, y_from=-1.0, y_to=0.5),
-        MortarVoid(slab=8, x_from=0.0, x_to=0.6, y_from=-1.25, y_to=1.25, factor=0.3),
+        MortarVoid(slab=3, x=(1.0, 2.0), y=(-1.0, 0.5)),
+        MortarVoid(slab=8, x=(0.0, 0.6), y=(-1.25, 1.25), factor=0.3),
     ]
     designs, which = slab_designs(*slab_and_mortar, voids)
     assert which == {3: 1, 8: 2}
@@ -214,7 +215,7 @@ def test_lateral_bed(slab_and_mortar: tuple[Slab, Mortar], matrices: SlabMatrice
 def test_void_takes_its_share_of_the_bed(slab_and_mortar: tuple[Slab, Mortar], matrices: SlabMatrices) -> None:
     """Total stiffness and damping fall by (1 - factor) k A_void, edges anywhere, laterally as well."""
     slab, mortar = slab_and_mortar
-    void = MortarVoid(slab=0, x_from=0.123, x_to=2.71, y_from=-1.11, y_to=0.4567, factor=0.2)
+    void = MortarVoid(slab=0, x=(0.123, 2.71), y=(-1.11, 0.4567), factor=0.2)
     m = slab_matrices(slab, mortar, [void])
     lost = (1.0 - 0.2) * (2.71 - 0.123) * (0.4567 + 1.11)
     u = node_field(slab, 0, 0)
@@ -236,7 +237,7 @@ def test_void_takes_its_share_of_the_bed(slab_and_mortar: tuple[Slab, Mortar], m
 def test_weight_stays_in_balance_over_a_void(slab_and_mortar: tuple[Slab, Mortar]) -> None:
     """The bed carries m g; rho g h everywhere without voids, nothing under a void, more beside it."""
     slab, mortar = slab_and_mortar
-    void = MortarVoid(slab=0, x_from=2.0, x_to=3.0, y_from=-1.25, y_to=1.25)
+    void = MortarVoid(slab=0, x=(2.0, 3.0), y=(-1.25, 1.25))
     m = slab_matrices(slab, mortar, [void])
     carried = np.sum(m.bed_weight * m.bed_weight_pressure)
     assert carried == pytest.approx(slab.mass * GRAVITY, rel=1e-10)  # a solve of condition 1e3
@@ -330,6 +331,6 @@ def test_slab_file_without_mortar(tmp_path: Path) -> None:
 
 
 def test_voids_of_several_slabs_are_no_single_design(slab_and_mortar: tuple[Slab, Mortar]) -> None:
-    voids = [MortarVoid(slab=i, x_from=0.0, x_to=1.0, y_from=0.0, y_to=1.0) for i in (0, 1)]
+    voids = [MortarVoid(slab=i, x=(0.0, 1.0), y=(0.0, 1.0)) for i in (0, 1)]
     with pytest.raises(InputError, match="mortar void on slab 1: every void must be on slab 0"):
         slab_matrices(*slab_and_mortar, voids)

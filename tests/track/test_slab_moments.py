@@ -31,7 +31,7 @@ def nodal(slab: Slab, x_part: Polynomial, y_part: Polynomial) -> NDArray[np.floa
 
 
 def places(slab: Slab, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where points of all elements lie, from the slab's centre [m], shape (elements points,) each."""
+    """Coordinates of the points of all elements, from the slab's centre [m], shape (elements points,) each."""
     ex, ey = np.divmod(np.arange(slab.elements_x * slab.elements_y)[:, None], slab.elements_y)
     x = (ex + (points[:, 0] + 1.0) / 2.0) * slab.length / slab.elements_x - slab.length / 2.0
     y = (ey + (points[:, 1] + 1.0) / 2.0) * slab.width / slab.elements_y - slab.width / 2.0

@@ -13,7 +13,7 @@ from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset, preset_source
 from tiengine.parameters.quantity import build
 from tiengine.vehicle.coach import Coach, expand
-from tiengine.vehicle.connector import Body, Damper, Spring, Stop, end_motion, prolonged
+from tiengine.vehicle.connector import Body, Damper, Spring, Stop, end_motion, extend_table
 from tiengine.vehicle.train import assemble, static_wheel_loads
 from tiengine.vehicle.vehicle import load_vehicle, vehicle_from_table, vehicle_names
 
@@ -129,7 +129,7 @@ def test_damper_and_stop_tables():
     assert damper.table == pytest.approx(np.array([[0, 0], [0.004, 9810.0], [0.008, 10009.8]]), rel=1e-12)
     stop = Stop(**ends, direction="y", x=(0.02, 0.026), F=(0.0, 2e3))
     assert stop.table.tolist() == [[0.0, 0.0], [0.02, 0.0], [0.026, 2e3]]
-    assert prolonged(stop.table, 5)[-1] == pytest.approx([0.038, 6e3], rel=1e-12)
+    assert extend_table(stop.table, 5)[-1] == pytest.approx([0.038, 6e3], rel=1e-12)
 
 
 def test_general_form_equals_the_coach_form():
@@ -161,7 +161,7 @@ def test_extra_bodies_hang_on_a_coach():
     # lateral springs carry nothing here, so the 0.2 m between their ends leave no moment over
     assert (right - left) * 0.7465 == pytest.approx(4000.0 * 9.81 * 0.3, rel=1e-9)
     loose = assemble([vehicle_from_table(table | {"body": [unit], "spring": hangers[:1]})])
-    with pytest.raises(InputError, match=r"^unit: springs leave it free to move, mostly in \w+$"):
+    with pytest.raises(InputError, match=r"^unit: not restrained by springs, mostly in \w+$"):
         static_wheel_loads(loose)
 
 
@@ -208,12 +208,12 @@ def test_bad_vehicles_are_refused():
     twin = tiny_vehicle().model_dump()
     with pytest.raises(InputError, match=r"tiny\.body\[2\]\.name = 'car': must differ from the others"):
         vehicle_from_table(twin | {"body": (*twin["body"], twin["body"][0])}, "tiny")
-    with pytest.raises(InputError, match=r"tiny\.body: one at least must be a wheelset"):
+    with pytest.raises(InputError, match=r"tiny\.body: at least one must be a wheelset"):
         vehicle_from_table(twin | {"body": twin["body"][:1]}, "tiny")
     second = twin["body"][1] | {"name": "axle 2"}
     with pytest.raises(InputError, match=r"tiny\.body: no two wheelsets may have the same x"):
         vehicle_from_table(twin | {"body": (*twin["body"], second)}, "tiny")
-    with pytest.raises(InputError, match=r"^car: no longitudinal spring \(kx\) carries its inertia"):
+    with pytest.raises(InputError, match=r"^car: no longitudinal spring \(kx\) transmits its inertia"):
         assemble([tiny_vehicle(spring=[{"kz": 1e6}])])
 
 

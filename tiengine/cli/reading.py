@@ -1,7 +1,4 @@
-"""Commands that read results: ``tiengine info``, ``metrics``, ``plot``, ``report``; none of them needs Taichi to begin.
-
-:data:`COMMANDS` joins the group of :mod:`tiengine.cli.commands`.
-"""
+"""Commands that read results: ``tiengine info``, ``metrics``, ``plot``, ``report``, ``export``; none imports Taichi."""
 
 from __future__ import annotations
 
@@ -32,7 +29,7 @@ TEXT_FILES = (".csv", ".txt")
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 def info(file: Path) -> None:
-    """Say what a result FILE holds and how it was made."""
+    """Describe the contents and the origin of a result FILE."""
     from tiengine import result as results
 
     with results.open(file) as result:
@@ -53,8 +50,10 @@ def info(file: Path) -> None:
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--train", type=click.IntRange(0), help="One train of an ensemble; default: all, summarised.")
-@click.option("--json", "output", type=click.Path(path_type=Path), help="Write all indices here too, replacing a file.")
+@click.option("--train", type=click.IntRange(0), help="Index of one train of an ensemble; default: summary of all.")
+@click.option(
+    "--json", "output", type=click.Path(path_type=Path), help="Also write all indices to this file, replacing it."
+)
 @click.option("--class", "vehicle_class", type=click.Choice(CLASSES), help="Class of the vehicles, for their limits.")
 @click.option("--column", "columns", multiple=True, metavar="SIGNAL=COLUMN", help="Column of a text file; repeatable.")
 @click.option("--rate", type=float, help="Samples per second of a text file [Hz]; default: its column time.")
@@ -69,7 +68,7 @@ def metrics(
     columns: Sequence[str],
     **measured: float | None,
 ) -> None:
-    """Indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 with their limits.
+    """Evaluate the indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631, with their limits.
 
     FILE is a result, or a text file (.csv, .txt) of measured signals (docs/indices.md).
     """
@@ -91,12 +90,18 @@ def metrics(
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Ends in .csv, .parquet or .mat.")
-@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Train of an ensemble.")
-@click.option("--channel", "channels", multiple=True, help="GROUP or GROUP/CHANNEL; may be repeated; default: wheel.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="File to write, ending in .csv, .parquet or .mat.",
+)
+@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Index of the train.")
+@click.option("--channel", "channels", multiple=True, help="GROUP or GROUP/CHANNEL; can be repeated; default: wheel.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def export(file: Path, output: Path, train: int, channels: Sequence[str], force: bool) -> None:
-    """Write channels of a result FILE as CSV, Parquet or MATLAB (docs/results.md)."""
+    """Export channels of a result FILE to CSV, Parquet or MATLAB (docs/results.md)."""
     from tiengine import result as results
     from tiengine.result_files import export as exporting
 
@@ -108,11 +113,13 @@ def export(file: Path, output: Path, train: int, channels: Sequence[str], force:
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.argument("kind", type=click.Choice(names()), required=False)
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Figure (.png, .pdf, .svg) or folder.")
-@click.option("--with", "other", type=click.Path(path_type=Path), help="Second file, of kind compare.")
-@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="One train of an ensemble.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Figure to write (.png, .pdf, .svg), or a folder."
+)
+@click.option("--with", "other", type=click.Path(path_type=Path), help="Second result, for the kind compare.")
+@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Index of the train.")
 def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, train: int) -> None:
-    """Draw figures of a result FILE: one KIND, or all that it can give, into FILE_KIND.png; replaces figures."""
+    """Draw one KIND of figure of a result FILE, or all available ones, as FILE_KIND.png; replaces existing figures."""
     from tiengine import result as results
     from tiengine.figures.files import draw_all, draw_one
 
@@ -129,11 +136,11 @@ def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Page to write, replacing one; FILE.html if none."
+    "-o", "--output", type=click.Path(path_type=Path), help="Page to write, replacing it; default: FILE.html."
 )
-@click.option("--train", type=click.IntRange(0), help="Whose figures; default: the first that ran to its end.")
+@click.option("--train", type=click.IntRange(0), help="Index of the train to draw; default: the first complete one.")
 def report(file: Path, output: Path | None, train: int | None) -> None:
-    """Make one HTML page of a result FILE: scenario, key figures, indices and figures; it needs no network."""
+    """Write a self-contained HTML page of a result FILE: scenario, key figures, indices and figures."""
     from tiengine import result as results
     from tiengine.report import page as reporting
 
@@ -148,9 +155,9 @@ def _text(value: Any) -> str:
 
 
 def _groups(train: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Name of every group of a train, with its samples and channels."""
+    """Name of each group of a train, with its number of samples and its channels."""
     for name, group in train.items():
-        if not hasattr(group, "keys"):  # the train's own time is a dataset
+        if not hasattr(group, "keys"):  # format version 1 has a dataset "time" here
             continue
         channels = {key: dataset for key, dataset in group.items() if "coordinates" in dataset.attrs}
         if channels:
@@ -215,3 +222,4 @@ def _measured_metrics(
 
 
 COMMANDS = (info, metrics, plot, report, export)
+"""Added to the group of :mod:`tiengine.cli.commands`."""

@@ -60,7 +60,7 @@ def wheelset_position(pair: WheelRailPair, y: ArrayLike) -> WheelsetPosition:
         low[active] = np.where(error < 0.0, phi, low[active])
         high[active] = np.where(error < 0.0, high[active], phi)
         newton = phi - error / slope
-        inside = (newton >= low[active]) & (newton <= high[active])  # else: across a contact jump, back and forth
+        inside = (newton >= low[active]) & (newton <= high[active])  # a contact jump may make Newton oscillate
         roll[active] = np.where(inside, newton, 0.5 * (low[active] + high[active]))
         active = active[np.abs(roll[active] - phi) > 1e-12]
         if active.size == 0:
@@ -75,7 +75,7 @@ def _both_contacts(pair: WheelRailPair, y: Reals, roll: Reals) -> tuple[Contacts
 
 
 def rolling_radius_difference(pair: WheelRailPair, y: ArrayLike) -> Reals:
-    """Right less left rolling radius [m] of a wheelset shifted by y to the right [m], shape (n,)."""
+    """Right minus left rolling radius [m] of a wheelset shifted by y to the right [m], shape (n,)."""
     position = wheelset_position(pair, y)
     return position.right.dz_w - position.left.dz_w
 
@@ -88,7 +88,7 @@ def equivalent_conicity(pair: WheelRailPair, amplitude: ArrayLike, phases: int =
     Args:
         pair: Wheel and rail.
         amplitude: Amplitudes A [m], shape (n,).
-        phases: Points of the mean over the period.
+        phases: Points per period of the mean.
 
     Returns:
         lambda, shape (n,).

@@ -14,10 +14,8 @@ mm arc joint by 0.03 um.
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +25,9 @@ from scipy.optimize import brentq
 from tiengine.contact.profile_files import read_profile
 from tiengine.contact.profile_frame import FEWEST_POINTS, Kind, increasing_run, placed, smoothing_curve
 from tiengine.parameters.arrays import Reals
-from tiengine.parameters.errors import InputError
+from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.input_files import is_file
+from tiengine.parameters.presets import find_preset, preset_names
 
 __all__ = ["Kind", "Profile", "load_profile", "profile_names"]
 
@@ -46,8 +45,8 @@ class Profile:
         y: Lateral positions, outward positive, strictly increasing [m], shape (n,).
         z: Heights, down positive [m], shape (n,).
         has_cant: The points are those of a rail already inclined in the track.
-        smoothing: Length l of the smoothing spline [m], 0 for interpolation; some 0.5e-3 for a measured
-            profile.
+        smoothing: Length l of the smoothing spline [m], 0 for interpolation; about 0.5e-3 for a
+            measured profile.
 
     Raises:
         InputError: Fewer than 10 points, a value that is not finite, or y that does not increase.
@@ -122,16 +121,16 @@ class Profile:
         return self.path(inside) + slope * (t - inside)[:, None], slope
 
     def canted(self, cant: float) -> Profile:
-        """The rail as it stands in the track, its head leaning inward.
+        """Rail inclined inward by the cant, as installed in the track.
 
         The origin is the crown, the point of the head whose tangent is inclined by the cant: for a rail drawn
-        upright it is the origin of the drawing. A rail whose points are inclined already is only moved there.
+        upright it is the origin of the drawing. A rail whose points are inclined already is only shifted.
 
         Args:
             cant: Inclination, 0.025 for 1:40.
 
         Returns:
-            The inclined profile, cut where the side would overhang.
+            The inclined profile, cut where its side would overhang.
         """
         if self.has_cant:
             crown = self._crown(cant)
@@ -143,7 +142,7 @@ class Profile:
         return replace(self, y=y[first:last], z=z[first:last], has_cant=True)
 
     def _crown(self, cant: float) -> float:
-        """Where the head's tangent falls inward by ``cant`` [m]."""
+        """The y where the head's tangent falls inward by ``cant`` [m]."""
         top = float(self.y[np.argmin(self.z)])
         try:
             return float(brentq(lambda y: float(self.height(y, 1)) + cant, top - 25e-3, top + 1e-3, xtol=1e-12))
@@ -173,8 +172,7 @@ class Profile:
 
 def profile_names() -> list[str]:
     """Names of the profiles of the library."""
-    folder = resources.files("tiengine.library") / "profiles"
-    return sorted(entry.name.removesuffix(".csv") for entry in folder.iterdir() if entry.name.endswith(".csv"))
+    return preset_names("profiles")
 
 
 def load_profile(
@@ -186,14 +184,14 @@ def load_profile(
     mirror: bool | None = None,
     tape_circle: float = 0.0,
 ) -> Profile:
-    """A profile of the library, or one read from a file (formats: :mod:`tiengine.contact.profile_files`).
+    """Load a profile of the library or of a file (formats: :mod:`tiengine.contact.profile_files`).
 
     Args:
         name_or_path: Name of a preset (``"LMA"``, ``"S1002"``, ``"CHN60"``, ``"60E1"``) or path of a file.
         kind: ``"wheel"`` or ``"rail"``.
         has_cant: The points are those of an inclined rail.
         smoothing: Length of the smoothing spline [m].
-        mirror: A rail's gauge face is at the file's positive y; None if nothing is known.
+        mirror: Whether a rail's gauge face is at the file's positive y; None if not stated.
         tape_circle: Distance of a wheel's tape circle outward from the file's y = 0 [m].
 
     Returns:
@@ -205,13 +203,11 @@ def load_profile(
     """
     name = str(name_or_path)
     if name in profile_names():
-        path = Path(str(resources.files("tiengine.library") / "profiles" / f"{name}.csv"))
+        path = find_preset("profiles", name)
     elif is_file(Path(name)):
         path = Path(name)
     else:
-        close = difflib.get_close_matches(name, profile_names(), n=1, cutoff=0.3)
-        hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(profile_names())}"
-        raise InputError(f"{kind} profile {name!r}: neither a file nor a preset; {hint}")
+        raise InputError(f"{kind} profile {name!r}: neither a file nor a preset{nearest(name, profile_names())}")
     found = read_profile(path, kind, f"{kind} profile {name!r}")
     points = placed(
         found.points,

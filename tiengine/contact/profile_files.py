@@ -1,16 +1,16 @@
-"""Profiles from files: SIMPACK ``.prw`` and ``.prr``, MiniProf ``.whl`` and ``.ban``, two columns of text.
+"""Readers of profile files: SIMPACK ``.prw`` and ``.prr``, MiniProf ``.whl`` and ``.ban``, two columns of text.
 
 SIMPACK: ``key = value`` in the sections ``header`` and ``spline``, points between ``point.begin`` and ``point.end``,
-``!`` for comments. The spline's keys are carried out on the points in the order in which the format numbers them:
-least distance, shift, rotation, bounds, mirrors, inversion; ``units.len.f`` is user's lengths a metre. The weights of
-points and ``approx.smooth`` are not used.
+``!`` for comments. The spline's keys are applied to the points in the order in which the format numbers them: least
+distance, shift, rotation, bounds, mirrors, inversion; ``units.len.f`` is the number of length units per metre. The
+weights of points and ``approx.smooth`` are not used.
 
 MiniProf: ``key=value`` lines (or the old style's free text), then rows of the columns that ``ColumnDef`` names, x and y
 first unless it says otherwise; ``"``, ``!`` and ``%`` begin comments.
 
 Text: y and z, separated by commas, semicolons or blanks, ``#`` for comments, y rising or falling from line to line.
 
-Text and MiniProf hold millimetres or metres; a profile's width tells which. Nothing of a file is ever evaluated.
+Text and MiniProf hold millimetres or metres, distinguished by the profile's width. No content is ever evaluated.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ from tiengine.parameters.input_files import LARGEST_PROFILE, numbers_of, read_te
 
 __all__ = ["FORMATS", "MOST_POINTS", "read_profile"]
 
-MOST_POINTS = 20_000  # a laser gives some thousand
+MOST_POINTS = 20_000  # laser scans have some thousand
 LARGEST_FACTOR = 1e6  # of units
-WIDTH = (10.0, 400.0)  # mm, what a list of points may span
+WIDTH = (10.0, 400.0)  # mm, range of widths
 Lines = Sequence[tuple[int, str]]
 """Numbered lines."""
 
 
 def read_profile(path: str | Path, kind: Kind, where: str = "") -> PointList:
-    """The points of a file, oriented and found to be smooth.
+    """Read the points of a file, orient them and check that they are smooth.
 
     Args:
-        path: A file; its suffix tells the format, any other than those of :data:`FORMATS` means two columns.
+        path: A file; its suffix selects the format, two columns for any suffix not in :data:`FORMATS`.
         kind: ``"wheel"`` or ``"rail"``.
         where: Name of the profile for messages; kind and path if empty.
 
     Returns:
-        y and z in mm, y outward and z down; a wheel's flange, a rail's head tell the directions.
+        y and z in mm, y outward and z down, as a wheel's flange or a rail's head shows.
 
     Raises:
         InputError: The file breaks a rule; the message names the file, the line and the rule.
@@ -71,7 +71,7 @@ def read_profile(path: str | Path, kind: Kind, where: str = "") -> PointList:
 
 
 def _point_list(rows: Sequence[Sequence[float]], numbers: Sequence[int], where: str) -> PointList:
-    """Rows (y, z) of finite numbers."""
+    """Make a point list of finite rows (y, z)."""
     points = np.array(rows, dtype=np.float64).reshape(-1, 2)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
@@ -82,13 +82,13 @@ def _point_list(rows: Sequence[Sequence[float]], numbers: Sequence[int], where: 
 
 
 def _in_millimetres(found: PointList) -> PointList:
-    """The points, whose width tells metres from millimetres, in millimetres."""
+    """Convert to millimetres; the width tells metres from millimetres."""
     in_metres = len(found.points) > 0 and float(np.ptp(found.points[:, 0])) <= 1e-3 * WIDTH[1]
     return PointList(found.points * 1e3, found.lines, found.where) if in_metres else found
 
 
 def _read_columns(lines: Lines, kind: Kind, where: str) -> PointList:
-    """Two columns; y must rise, or fall, from line to line."""
+    """Read two columns; y must rise, or fall, from line to line."""
     rows, numbers = [], []
     for number, line in lines:
         fields = line.split("#")[0].replace(",", " ").replace(";", " ").split()
@@ -115,7 +115,7 @@ def _read_columns(lines: Lines, kind: Kind, where: str) -> PointList:
 
 
 def _read_miniprof(lines: Lines, kind: Kind, where: str) -> PointList:
-    """Header lines, then rows of columns."""
+    """Read header lines, then rows of columns."""
     header: dict[str, str] = {}
     rows: list[list[float]] = []
     numbers: list[int] = []
@@ -143,7 +143,7 @@ def _read_miniprof(lines: Lines, kind: Kind, where: str) -> PointList:
 
 
 def _miniprof_columns(definition: str, where: str) -> tuple[int, int]:
-    """Where x and y stand in a row."""
+    """Columns of x and y."""
     names = [name.strip().upper() for name in definition.split(",")]
     if "X" not in names or "Y" not in names:
         raise InputError(f"{where}: ColumnDef = {definition!r}: must name X and Y")
@@ -151,7 +151,7 @@ def _miniprof_columns(definition: str, where: str) -> tuple[int, int]:
 
 
 def _read_simpack(lines: Lines, kind: Kind, where: str) -> PointList:
-    """Sections of keys and one of points."""
+    """Read sections of keys and one of points."""
     keys: dict[str, tuple[int, str]] = {}
     rows: list[list[float]] = []
     numbers: list[int] = []
@@ -175,14 +175,14 @@ def _read_simpack(lines: Lines, kind: Kind, where: str) -> PointList:
             numbers.append(number)
     if not is_complete:
         raise InputError(f"{where}: line {len(lines)}: ends without point.begin ... point.end; is the file cut off?")
-    if "header:type" in keys and (given := _simpack_number(keys, "header:type", 0.0, where)) != (kind == "wheel"):
+    if "header:type" in keys and (stated := _simpack_number(keys, "header:type", 0.0, where)) != (kind == "wheel"):
         number = keys["header:type"][0]
-        raise InputError(f"{where}: line {number}: header type = {given:g}: must be 0 for a rail, 1 for a wheel")
+        raise InputError(f"{where}: line {number}: header type = {stated:g}: must be 0 for a rail, 1 for a wheel")
     return _simpack_processed(_point_list(rows, numbers, where), keys)
 
 
 def _simpack_number(keys: dict[str, tuple[int, str]], key: str, default: float, where: str) -> float:
-    """Value of a key."""
+    """Numeric value of a key."""
     number, text = keys.get(key, (0, str(default)))
     values = numbers_of([text])
     if values is None or not np.isfinite(values[0]):
@@ -191,7 +191,7 @@ def _simpack_number(keys: dict[str, tuple[int, str]], key: str, default: float, 
 
 
 def _simpack_processed(found: PointList, keys: dict[str, tuple[int, str]]) -> PointList:
-    """The points after what the file says is to be done with them [mm]."""
+    """Apply the processing keys of the file to its points [mm]."""
 
     def value(key: str, default: float = 0.0) -> float:
         return _simpack_number(keys, f"spline:{key}", default, found.where)
@@ -216,7 +216,7 @@ def _simpack_processed(found: PointList, keys: dict[str, tuple[int, str]]) -> Po
         points = points @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     for axis, name in enumerate("yz"):
         low, high = value(f"bound.{name}.min"), value(f"bound.{name}.max")
-        if low < high:  # the other way round they are switched off
+        if low < high:  # bounds with low >= high are inactive
             within = (points[:, axis] >= low) & (points[:, axis] <= high)
             points, lines = points[within], lines[within]
     points = points * [-1.0 if value("mirror.y") else 1.0, -1.0 if value("mirror.z") else 1.0]

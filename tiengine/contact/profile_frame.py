@@ -1,11 +1,11 @@
-"""Bringing a list of points into the frame of profiles: which way round it is, where its zero is, whether it is smooth.
+"""Placement of point lists in the frame of profiles: orientation, origin, smoothness.
 
-Which way round, from the shape: a rail's head is high in the middle, a wheel's flange stands out most, and is inside.
-A rail's inner side cannot be told from a symmetric head; y must then be outward, or ``mirror`` says otherwise.
+Orientation follows from the shape: a rail's head is highest in the middle; a wheel's flange protrudes most and lies
+inside. The inner side of a symmetric railhead cannot be detected; y is taken as outward unless ``mirror`` is stated.
 
 A kink is a turn of the surface between the 1 mm before a point and the 1 mm after it. On a radius R it is 1 mm/R: 0.08
-at a gauge corner of R13 or a flange root of R12, 0.2 on R5, sharper than which no running surface is taken to be. A
-single point that lies 0.1 mm beside a smooth curve makes the same turn, rounding to 0.01 mm a tenth of it.
+at a gauge corner of R13 or a flange root of R12, 0.2 on R5, the limit for a running surface. A single point 0.1 mm off
+a smooth curve makes the same turn, rounding to 0.01 mm a tenth of it.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ KINK_WINDOW = 1.0  # mm
 KINK_TURN, KINK_CURVATURE = 0.12, 0.08  # rad and rad/mm: together 0.2 over the window, more where points are sparser
 FLANGE_HEIGHT = 15.0  # mm above the tread, at least; new flanges have 27 to 30
 FLANGE_TIP = (-75.0, -35.0)  # mm from the tape circle; 70 mm from the flange's back, its tip some 15 mm
-FIELD_SIDE = 55.0  # mm from the tape circle: beyond, chamfers are no running surface
-HEAD_DEPTH = 20.0  # mm below the top: beneath, a rail's side is not run on
-UNEVEN_DEPTH = 5.0  # mm by which the outer side may reach deeper before it is taken for the inner one
-ORIGIN = 1e-3  # mm: an origin off by less is the list's own rounding
+FIELD_SIDE = 55.0  # mm from the tape circle: chamfers beyond are not part of the running surface
+HEAD_DEPTH = 20.0  # mm below the top: a rail's side below is not part of the running surface
+UNEVEN_DEPTH = 5.0  # mm by which the points may reach deeper on the outer side than on the inner one
+ORIGIN = 1e-3  # mm: a smaller offset of the origin is rounding of the list
 RESAMPLED_STEP = 0.1  # mm
 LARGEST = 1e4  # mm
 
 
 @dataclass(frozen=True, eq=False)
 class PointList:
-    """Points as a file gives them.
+    """Points of a file.
 
     Attributes:
         points: y and z [mm], shape (n, 2).
-        lines: Where each stands in its file, shape (n,).
+        lines: Line of each point in its file, shape (n,).
         where: Name of the profile for messages.
     """
 
@@ -61,17 +61,17 @@ class PointList:
     where: str
 
 
-def oriented(given: PointList, kind: Kind) -> PointList:
-    """The points with z down and y from inside to outside, as far as their shape tells.
+def oriented(listed: PointList, kind: Kind) -> PointList:
+    """Orient points with z down and y from inside to outside, as far as their shape tells.
 
     Args:
-        given: Points in any direction.
+        listed: Points in any orientation.
         kind: ``"wheel"`` or ``"rail"``.
 
     Returns:
-        The same points, mirrored and reversed as needed; a symmetric rail keeps its y.
+        The same points, mirrored and reversed as needed; a rail keeps its y.
     """
-    points, lines = given.points.copy(), given.lines
+    points, lines = listed.points.copy(), listed.lines
     y, z = points.T
     if kind == "rail":
         middle = z[np.argmin(np.abs(y - 0.5 * (y.min() + y.max())))]
@@ -84,29 +84,29 @@ def oriented(given: PointList, kind: Kind) -> PointList:
             points[:, 0] *= -1.0
     if points[-1, 0] < points[0, 0]:
         points, lines = points[::-1].copy(), lines[::-1]
-    return replace(given, points=points + 0.0, lines=lines)  # no -0.0
+    return replace(listed, points=points + 0.0, lines=lines)  # no -0.0
 
 
 def _flange_tip(z: Reals) -> int | None:
-    """Index of the point that stands out most, at an end of the list only if no other does; None without a flange."""
+    """Index of the point that protrudes most, preferably not an end of the list; None without a flange."""
     height = z - np.median(z)
     tall = [int(i) for i in (np.argmax(height), np.argmin(height)) if abs(height[i]) >= FLANGE_HEIGHT]
     return max(tall, key=lambda i: (0 < i < z.size - 1, abs(height[i])), default=None)
 
 
-def check_kinks(given: PointList, kind: Kind) -> None:
+def check_kinks(listed: PointList, kind: Kind) -> None:
     """Refuse a running surface that is not smooth.
 
-    The flange's back and tip, the outer rim and a rail's sides are left out: what never touches may have edges.
+    The flange's back and tip, the outer rim and a rail's sides are not checked: they never touch and may have edges.
 
     Args:
-        given: Oriented points.
+        listed: Oriented points.
         kind: ``"wheel"`` or ``"rail"``.
 
     Raises:
         InputError: A kink; the message names line, position and turn.
     """
-    points = given.points
+    points = listed.points
     chord = np.hypot(*np.diff(points, axis=0).T)
     t = np.concatenate([[0.0], np.cumsum(chord)])
     rank = np.arange(t.size)
@@ -121,13 +121,13 @@ def check_kinks(given: PointList, kind: Kind) -> None:
         worst = int(np.argmax(excess))
         y, z = points[i[worst]]
         raise InputError(
-            f"{given.where}: line {given.lines[i[worst]]}: a kink of {np.degrees(abs(turn[worst])):.0f} deg within"
+            f"{listed.where}: line {listed.lines[i[worst]]}: a kink of {np.degrees(abs(turn[worst])):.0f} deg within"
             f" {KINK_WINDOW:g} mm at y = {y:.2f} mm, z = {z:.2f} mm; a smooth surface, rounder than R5, expected"
         )
 
 
 def _is_run_on(points: Reals, kind: Kind) -> NDArray[np.bool_]:
-    """Which points a wheel or a rail may touch with, shape (n,)."""
+    """Points that may touch, shape (n,)."""
     y, z = points.T
     if kind == "rail":
         return np.asarray(z < z.min() + HEAD_DEPTH)
@@ -148,7 +148,7 @@ def placed(
     mirror: bool | None = None,
     tape_circle: float = 0.0,
 ) -> Reals:
-    """The points with their origin where profiles have it, and y increasing throughout.
+    """Move points to the origin of profiles, with y increasing throughout.
 
     Lists whose y falls somewhere (overhanging sides, noise of a measurement on a steep flank) are replaced by equal
     steps along their smoothing spline, as far to either side as y increases.
@@ -157,16 +157,16 @@ def placed(
         points: y and z, oriented [mm], shape (n, 2).
         kind: ``"wheel"`` or ``"rail"``.
         where: Name of the profile for messages.
-        has_cant: The points are those of an inclined rail, which stays where it is.
+        has_cant: The points are those of an inclined rail, which is not moved.
         smoothing: Length of the smoothing spline [m].
-        mirror: A rail's gauge face is at positive y; None if nothing was said.
+        mirror: Whether a rail's gauge face is at positive y; None if not stated.
         tape_circle: Distance of a wheel's tape circle outward from the list's y = 0 [m].
 
     Returns:
         y and z [m], shape (m, 2).
 
     Raises:
-        InputError: Too few or too large points; the flange or the rail's sides lie where they cannot be.
+        InputError: Too few or too large points, or a flange or side of a rail at an impossible place.
     """
     if len(points) < FEWEST_POINTS or not (np.abs(points) < LARGEST).all():
         raise InputError(
@@ -215,7 +215,7 @@ def _placed_rail(points: Reals, where: str, mirror: bool | None) -> Reals:
 
 
 def _resampled(points: Reals, smoothing: float, kind: Kind, tape_circle: float) -> Reals:
-    """Equal steps along the smooth curve, as far around the top or the tread as y increases [mm]."""
+    """Resample in equal steps along the smooth curve, as far around top or tread as y increases [mm]."""
     apart = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
     curve = smoothing_curve(points[apart], smoothing)
     t = np.linspace(curve.x[0], curve.x[-1], int(curve.x[-1] / RESAMPLED_STEP) + 2)

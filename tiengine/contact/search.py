@@ -1,4 +1,4 @@
-"""Where a rigid wheel profile touches a rigid rail profile.
+"""Contact point of a rigid wheel profile on a rigid rail profile.
 
 Outward coordinate o from the crown of the canted rail, z down. A wheel shifted outward by u and tilted
 outward by alpha about its tape-circle point has the points
@@ -6,8 +6,8 @@ outward by alpha about its tape-circle point has the points
     o = u + offset + s cos(alpha) - z_w(s) sin(alpha),   z = s sin(alpha) + z_w(s) cos(alpha),
 
 and touches the rail where F(s) = z - z_r(o) is largest; -F is the vertical gap. Every local maximum of F on a
-coarse grid of stations that could be the largest is refined by Newton's method inside its bracket; jumps of
-the contact from one place to another are then at the right u.
+coarse grid of stations that could be the largest is refined by Newton's method inside its bracket, so that
+jumps of the contact from one place to another occur at the right u.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def find_contacts(wheel: Profile, rail: Profile, offset: float, u: ArrayLike, al
 
 
 def transverse_curvature(wheel: Profile, rail: Profile, contacts: Contacts, span: float) -> Reals:
-    """Transverse curvature of the gap as a patch of half width ``span`` feels it.
+    """Mean transverse curvature of the gap over a patch of half width ``span``.
 
     B = [g(+e) + g(-e) - 2 g(0)]/(2 e^2) with g the separation of the touching profiles normal to the contact
     plane and e along it.

@@ -5,9 +5,9 @@ With sigma = -1 left, +1 right, v and theta_x the rail's lateral and torsional d
     u = sigma [(y_w - r0 phi_w) - (v + h_r theta_x + y_irr)],   alpha = sigma (phi_w - theta_x - cross level)
 
 and the penetration measured vertically is z_w + sigma b0 phi_w - (rail) - g(u, alpha). Left and right wheels
-share the table. What a table holds has passed a Gaussian in u: contact jumps become C1 without changing
-means. Curvature is that of a patch of finite width, so that arc joints of the drawing do not make the
-stiffness jump.
+share the table. All tabulated quantities are smoothed by a Gaussian in u: contact jumps become C1 and means
+are kept. Curvature is measured over a patch of finite width, so that the stiffness does not jump where two
+arcs of a drawn profile join.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SMALLEST_CURVATURE = 0.02
 
 
 class ContactSettings(Params):
-    """How wheel and rail are placed, what they are made of, and how the table is made.
+    """Placement and material of wheel and rail, range and resolution of the table.
 
     Attributes are in SI; ``u`` is the wheel's outward shift, ``alpha`` its outward tilt.
     """
@@ -64,7 +64,7 @@ class ContactSettings(Params):
     dalpha: Annotated[float, Q("rad", "step in alpha", gt=0)] = 0.25e-3
 
     def axis(self, axis: Literal["u", "alpha"]) -> Reals:
-        """Nodes of the table: the range and one more at each end, for the outer tap of the interpolation.
+        """Nodes of the table: the range and one more at each end, for the outer point of the interpolation.
 
         Nodes are multiples of the step, so that (0, 0) is one.
 
@@ -74,7 +74,7 @@ class ContactSettings(Params):
         low, high, step = (
             (self.u_min, self.u_max, self.du) if axis == "u" else (-self.alpha_max, self.alpha_max, self.dalpha)
         )
-        inside = 1e-9  # a range that is a multiple of the step up to rounding gets no further node
+        inside = 1e-9  # a range that is a multiple of the step up to rounding gets no additional node
         return step * np.arange(np.floor(low / step + inside) - 1, np.ceil(high / step - inside) + 2)
 
 
@@ -89,7 +89,7 @@ class ContactTable:
         dalpha: Step of alpha [rad].
         values: Shape (n_u, n_alpha, 10), C-contiguous; the last axis as in :attr:`COLUMNS`.
         crown_offset: Distance of the rails' crowns from the track's centre, y_r [m].
-        settings: What the table was made with.
+        settings: Settings the table was built with.
     """
 
     u_min: float
@@ -116,7 +116,7 @@ class ContactTable:
     def lookup(self, u: ArrayLike, alpha: ArrayLike) -> Reals:
         """Catmull-Rom interpolation, continuous with its slope.
 
-        Arguments beyond the range of the settings are taken at its end.
+        Arguments beyond the range of the settings are clipped to it.
 
         Args:
             u: Outward shifts [m], broadcast against alpha.
@@ -135,7 +135,7 @@ class ContactTable:
 
 @dataclass(frozen=True, eq=False)
 class WheelRailPair:
-    """A wheel on a rail as they stand, without a table and without smoothing.
+    """Wheel and rail in their placement, neither tabulated nor smoothed.
 
     Attributes:
         wheel: Wheel profile.
@@ -155,12 +155,12 @@ class WheelRailPair:
 
     @cached_property
     def canted_rail(self) -> Profile:
-        """The rail in its place, origin at its crown."""
+        """Rail inclined by the cant, origin at its crown."""
         return self.rail.canted(self.settings.cant)
 
     @cached_property
     def crown_offset(self) -> float:
-        """Distance of the crown from the track's centre, y_r [m]; gauge is met gauge_depth below the top."""
+        """Distance of the crown from the track's centre, y_r [m]; the gauge holds at gauge_depth below the top."""
         return 0.5 * self.settings.gauge - self.canted_rail.inner_side(self.settings.gauge_depth)
 
     def contacts(self, u: ArrayLike, alpha: ArrayLike) -> Contacts:
@@ -206,7 +206,7 @@ def build_contact_table(wheel: Profile, rail: Profile, settings: ContactSettings
 def _smoothed_geometry(pair: WheelRailPair, u: Reals, alpha: Reals) -> Reals:
     """Gap, s_w, s_r, radius less r0, tan gamma, transverse curvature on the nodes, (6, n_u, n_alpha).
 
-    The contacts are found beyond the ends of u too, as far as the Gaussian reaches.
+    Contacts are also computed beyond the ends of u, over the reach of the Gaussian.
     """
     sigma, du = pair.settings.smoothing, pair.settings.du
     finer = max(1, int(np.ceil(du * STEPS_PER_SIGMA / sigma - 1e-9))) if sigma > 0.0 else 1

@@ -1,8 +1,8 @@
-"""Contact tables kept on disk: one takes two seconds to build and depends on the profiles and their placement alone.
+"""Disk cache of contact tables: a table takes two seconds to build and depends on profiles and placement only.
 
-A file holds the numbers of one table and nothing that could be run. Its name is a digest of all that goes in: points,
-settings, the source of the modules that build it, and the versions of NumPy and SciPy. What cannot be read or written
-is built anew; nothing depends on the cache but time.
+A file holds the numbers of one table and nothing executable. Its name is a digest of all inputs: points, settings, the
+source of the modules that build the table, and the versions of NumPy and SciPy. A file that cannot be read or written
+is ignored and the table is built again; the cache affects computing time only.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from tiengine.contact.table import ContactSettings, ContactTable, build_contact_
 __all__ = ["contact_table"]
 
 FOLDER = "TIENGINE_CACHE"
-"""Environment variable that names another folder."""
+"""Environment variable that overrides the cache folder."""
 MODULES: tuple[ModuleType, ...] = (contact_geometry, contact_search, hertz, kalker, profile, profile_frame)
 FIELDS = ("u_min", "du", "alpha_min", "dalpha", "crown_offset")
 
 
 def contact_table(wheel: Profile, rail: Profile, settings: ContactSettings) -> ContactTable:
-    """The table of a wheel and a rail, from the cache if it is there.
+    """Contact table of a wheel and a rail, read from the cache where present.
 
     Args:
         wheel: Wheel profile.
@@ -41,10 +41,10 @@ def contact_table(wheel: Profile, rail: Profile, settings: ContactSettings) -> C
         settings: Placement, material, range and smoothing.
 
     Returns:
-        The bits of :func:`tiengine.contact.table.build_contact_table`.
+        The same bits as :func:`tiengine.contact.table.build_contact_table`.
 
     Raises:
-        InputError: As there.
+        InputError: As :func:`tiengine.contact.table.build_contact_table`.
     """
     path = _folder() / f"contact-{_digest(wheel, rail, settings)}.npz"
     with contextlib.suppress(OSError, ValueError, KeyError, EOFError, BadZipFile), open(path, "rb") as file:
@@ -58,11 +58,12 @@ def contact_table(wheel: Profile, rail: Profile, settings: ContactSettings) -> C
 
 
 def _folder() -> Path:
+    """Folder of the cache."""
     return Path(os.environ[FOLDER]) if os.environ.get(FOLDER) else user_cache_path("tiengine")
 
 
 def _digest(wheel: Profile, rail: Profile, settings: ContactSettings) -> str:
-    """Of everything that the table depends on."""
+    """Digest of everything the table depends on, 32 hexadecimal digits."""
     digest = hashlib.sha256(f"{np.__version__} {scipy.__version__} {settings!r}".encode())
     for module in MODULES:
         digest.update(Path(str(module.__file__)).read_bytes())
@@ -73,7 +74,7 @@ def _digest(wheel: Profile, rail: Profile, settings: ContactSettings) -> str:
 
 
 def _write(path: Path, table: ContactTable) -> None:
-    """Under another name first, so that no reader sees half a file."""
+    """Write a table under a temporary name and rename it, so that no reader sees half a file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.stem}-{os.getpid()}.part")
     with open(part, "wb") as file:

@@ -1,1 +1,1 @@
-"""The changing data of a run and the time step."""
+"""State of a run and its time step."""

@@ -1,4 +1,4 @@
-"""The only place that initialises Taichi."""
+"""Initialisation of Taichi, in this module only."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def start(threads: int = 1, debug: bool = False) -> float:
 
     Args:
         threads: Threads of Taichi's parallel loops over trains. Results do not depend on it.
-        debug: Bounds checks in every kernel (some 35 times slower).
+        debug: Bounds checks in every kernel (about 35 times slower).
 
     Returns:
         Wall time of the first initialisation in this process [s].
@@ -43,10 +43,10 @@ def start(threads: int = 1, debug: bool = False) -> float:
 
 
 def _forget_source_positions() -> None:
-    """Let Taichi translate kernels without a drawing of each expression's place in the source.
+    """Let Taichi translate kernels without rendering the source position of each expression.
 
-    The drawings are for its messages about wrong kernels, and take two thirds of the time that a kernel found in the
-    cache on disk costs. Private API of the pinned version; another one keeps its drawings.
+    The positions appear in its messages about wrong kernels only, and rendering them takes two thirds of the time of
+    loading a kernel from the cache on disk. Private API of the pinned version; other versions keep rendering.
     """
     context: Any = getattr(ast_transformer_utils, "ASTTransformerContext", None)
     if hasattr(context, "get_pos_info"):

@@ -1,4 +1,4 @@
-"""Start from steady rolling at speed V over the seats as they stand at t = 0 (MODEL §7).
+"""Start from steady rolling at speed V over the seats at their places at t = 0 (MODEL §7).
 
 With d/dt = 0 everywhere but for the wheelsets' spin, the track is linear: the rails' motion under the wheels follows
 from the contact forces by a constant compliance. Unknowns are the train's coordinates (a wheelset's pitch is replaced
@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State, positions
+from tiengine.engine.sine_state import SineState
 from tiengine.engine.static_track import StaticTrack
+from tiengine.engine.window import window_clock
 from tiengine.kernels import contact as kernels
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import N_CONTACT
@@ -32,7 +33,7 @@ NUDGE_FORCE = 1.0  # N
 
 @dataclass(frozen=True, eq=False)
 class ContactForces:
-    """What the contact kernel returns; B trains, W wheelsets.
+    """Results of the contact kernel; B trains, W wheelsets.
 
     Attributes:
         contact: Contact states, shape (B, W, 2, N_CONTACT).
@@ -73,7 +74,7 @@ def evaluate_contact(
         V,
         int(model.dims[at.CROSS_LEVEL_ROLLS]),
         model.constants,
-        model.given.contact.values,
+        model.ingredients.contact.values,
         model.wheel,
         np.ascontiguousarray(np.broadcast_to(irregularity, (B, W, at.N_IRREGULARITY))),
         np.ascontiguousarray(wheelset_u),
@@ -87,7 +88,7 @@ def evaluate_contact(
     return out
 
 
-def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 0.0) -> None:
+def equilibrium(model: Model, state: SineState, X: float, V: float, V_rate: float = 0.0) -> None:
     """Put all trains of a state into steady rolling on a smooth track.
 
     Args:
@@ -100,7 +101,7 @@ def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 
     Raises:
         InputError: Newton's method found no equilibrium.
     """
-    clock = positions(model, np.array([X]), np.array([V]), np.array([V_rate])).clock[0]
+    clock = window_clock(model.ingredients.slab, np.array([X]), np.array([V]), np.array([V_rate]))[0]
     state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
     track = StaticTrack(model, state, float(clock[at.FIRST_SEAT_S]), V)
     problem = _Problem(model, track, V, V_rate)
@@ -118,7 +119,7 @@ def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 
     state.wheelset_force[:], state.rail_force[:] = forces.wheelset, forces.rail
 
 
-def release(model: Model, state: State, X: float) -> None:
+def release(model: Model, state: SineState, X: float) -> None:
     """Put all trains onto the track without load, as the paper does: all zero but the weight's acceleration.
 
     Args:
@@ -126,11 +127,11 @@ def release(model: Model, state: State, X: float) -> None:
         state: Written.
         X: Chainage of the window's rear end [m].
     """
-    clock = positions(model, np.array([X]), np.zeros(1), np.zeros(1)).clock[0]
+    clock = window_clock(model.ingredients.slab, np.array([X]), np.zeros(1), np.zeros(1))[0]
     state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
-    n = model.given.train.n_dof
-    mass = np.diag(model.given.train.M)
-    state.view(at.A, "vehicles")[:, :n] = model.given.train.gravity[:n] / mass[:n]
+    n = model.ingredients.train.n_dof
+    mass = np.diag(model.ingredients.train.M)
+    state.view(at.A, "vehicles")[:, :n] = model.ingredients.train.gravity[:n] / mass[:n]
 
 
 class _Problem:
@@ -138,7 +139,7 @@ class _Problem:
 
     def __init__(self, model: Model, track: StaticTrack, V: float, V_rate: float) -> None:
         self.model, self.track, self.V = model, track, V
-        self.train = model.given.train
+        self.train = model.ingredients.train
         self.pitch = self.train.wheelset_dof[:, 3]
         self.load = self.train.gravity + V_rate * self.train.acceleration_force
 
@@ -200,7 +201,7 @@ class _Problem:
         """Vertical equilibrium on linearised contact springs, the track held."""
         train, dof = self.train, self.train.wheelset_dof
         load = float(self.model.constants[at.STATIC_LOAD])
-        centre = self.model.given.contact.lookup(np.array(0.0), np.array(0.0))
+        centre = self.model.ingredients.contact.lookup(np.array(0.0), np.array(0.0))
         approach = (load / centre[at.HERTZ]) ** (2.0 / 3.0)
         stiffness = 1.5 * load / approach
         K = train.K.copy()

@@ -1,8 +1,8 @@
 """Launching a kernel many times with the same arrays.
 
-A public Taichi call checks and packs every argument: some 13 us an array. Here the launch context is built once and
-launched again and again (0.5 us an array). That is private API of the pinned Taichi; where it is not available, or
-where the caller asks for it, the public call does the same work.
+A public Taichi call checks and packs every argument: about 13 µs per array. Here the launch context is built once and
+launched repeatedly (0.5 µs per array). This is private API of the pinned Taichi; where it is not available, or if the
+caller requires it, the public call does the same work.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ TESTED = (1, 7, 4)
 
 
 class Launch:
-    """A kernel bound to its arguments; call it without any.
+    """A kernel bound to its arguments, called without any.
 
     Attributes:
-        compile_seconds: Wall time of compiling, the launch that compiles included if it had to be public [s].
+        compile_seconds: Wall time of compiling [s].
     """
 
     def __init__(self, kernel: Any, static: tuple[Any, ...], arrays: tuple[NDArray[Any], ...], *, public: bool = False):
@@ -54,7 +54,7 @@ class Launch:
 
 
 def _bind(kernel: Any, static: tuple[Any, ...], arrays: tuple[NDArray[Any], ...]) -> Callable[[], Any]:
-    """Build the launch context once (what ``Kernel.launch_kernel`` does at every call)."""
+    """Build the launch context once, as ``Kernel.launch_kernel`` does at every call."""
     compiled = kernel.compiled_kernels[kernel.ensure_compiled(*static, *arrays)]
     program = impl.get_runtime().prog
     data = program.compile_kernel(program.config(), program.get_device_caps(), compiled)

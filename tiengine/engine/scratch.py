@@ -1,4 +1,4 @@
-"""What one launch of a step leaves for the next: factors and results of the host's matrix products."""
+"""Work arrays of the step with sines: factors and results of the host's matrix products."""
 
 from __future__ import annotations
 
@@ -22,13 +22,15 @@ class Scratch:
         flow: 2 V du/dt + dV/dt u of the fields w, v, theta_x, theta_y, theta_z, shape (5, B, 2, N); fields outermost,
             so that all trains are right-hand sides of one product.
         drift: G times these, same shape.
-        rail_factor: Modal numbers of what the rails pull at the seats (V, L, M), shape (B, 2, 3, 2N).
-        rail_pull: What they pull [N, N, N m], shape (B, 2, 3, seats).
+        rail_factor: Modal factors of the forces at the seats by the rails' motion (V, L, M), shape (B, 2, 3, 2N).
+        rail_pull: These forces [N, N, N m], shape (B, 2, 3, seats).
         slab_factor: k u + c v of the slabs, shape (B, slots, dofs).
-        slab_pull: What their motion takes off at the seats, at the predictors and at the iterate, moments by b^2,
+        slab_pull: Forces at the seats by their motion, at the predictors and at the iterate, moments over b^2,
             shape (2, B, slots, 5, n).
         slab_force: Forces of the seats on the slabs, shape (B, slots, 5, n).
         bed_motion: Bed's k u + c v of the slabs, shape (B slots dofs,).
+        bed: The same where the bodies are recorded, shape (B, rows, slots dofs).
+        design: Design of the slab in each slot then, shape (rows, slots).
         damped: Acceleration of slabs, then trains, by their own damping, shape (columns,).
         rail_predicted: Rails under the wheels at the predictors: w, v, theta_x, slopes, rates, shape (B, W, 2, 9).
     """
@@ -42,12 +44,14 @@ class Scratch:
     slab_pull: NDArray[np.float64]
     slab_force: NDArray[np.float64]
     bed_motion: NDArray[np.float64]
+    bed: NDArray[np.float64]
+    design: NDArray[np.int32]
     damped: NDArray[np.float64]
     rail_predicted: NDArray[np.float64]
 
     @classmethod
-    def of(cls, model: Model) -> Scratch:
-        """Zeros of the model's sizes."""
+    def of(cls, model: Model, body_rows: int) -> Scratch:
+        """Zeros of the model's sizes, for a chunk with some records of the bodies."""
         sizes = (at.TRAINS, at.MODES, at.SEATS, at.WHEELSETS, at.SLOTS, at.SLAB_DOFS, at.SEATS_PER_SLAB)
         B, N, seats, W, slots, dofs, per_slab = (int(model.dims[size]) for size in sizes)
         vehicle = int(model.dims[at.VEHICLE_DOFS])
@@ -61,6 +65,8 @@ class Scratch:
             slab_pull=np.zeros((2, B, slots, 5, per_slab)),
             slab_force=np.zeros((B, slots, 5, per_slab)),
             bed_motion=np.zeros(B * slots * dofs),
+            bed=np.zeros((B, body_rows, slots * dofs)),
+            design=np.zeros((body_rows, slots), dtype=np.int32),
             damped=np.zeros(B * (slots * dofs + vehicle)),
             rail_predicted=np.zeros((B, W, 2, 9)),
         )

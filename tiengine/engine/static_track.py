@@ -1,7 +1,7 @@
-"""The track under steady loads: d/dt = 0 in the moving frame, seats where they stand at one instant.
+"""Track under steady loads: d/dt = 0 in the moving frame, seats at their places at one instant.
 
-Assembled from matrices on the host, apart from the kernels (which it also checks). A fastening's damper still feels the
-convective rate -V d/ds. Slabs are eliminated one by one, since each is joined to the rails only.
+Assembled from matrices on the host, independently of the kernels (which it also checks). A fastening's damper still
+responds to the convective rate -V d/ds. Slabs are eliminated one by one, since each is joined to the rails only.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.kernels import layout as at
 from tiengine.model.model import Model
 
@@ -22,27 +22,27 @@ __all__ = ["StaticTrack"]
 class StaticTrack:
     """Compliance of both rails on slabs; unknowns of a rail are w, theta_y, v, theta_z, theta_x, each N."""
 
-    def __init__(self, model: Model, state: State, first_seat_s: float, V: float, train: int = 0) -> None:
+    def __init__(self, model: Model, state: SineState, first_seat_s: float, V: float, train: int = 0) -> None:
         """Assemble and factorise.
 
         Args:
             model: Constant data.
-            state: Gives slabs and fastenings of the window.
+            state: Slabs and fastenings of the window.
             first_seat_s: Rear seat [m from the window's rear end].
             V: Speed [m/s].
-            train: Which train's track.
+            train: Place of the train whose track is taken.
         """
         self.model, self.V = model, V
-        n = model.given.modes
+        n = model.ingredients.modes
         rail = la.block_diag(model.window.vertical(V)[2].toarray(), model.window.lateral(V)[2].toarray())
         K = la.block_diag(rail, rail)
         self._slabs: list[tuple[int, tuple[NDArray[np.float64], NDArray[np.int32]], NDArray[np.float64]]] = []
-        slots = model.given.slots
+        slots = model.ingredients.slots
         for slab, springs in self._springs(state, first_seat_s, train).items():
             K += springs.test.T @ springs.pull
             if slab >= state.first_slab + slots:
                 continue  # beyond the modelled slabs the ground is rigid
-            design = model.given.designs.matrices[state.design[train, slab % slots]]
+            design = model.ingredients.designs.matrices[state.design[train, slab % slots]]
             own = springs.slab.T @ (springs.stiffness[:, None] * springs.slab)
             to_slab = -springs.slab.T @ springs.pull
             to_rail = -springs.test.T @ (springs.stiffness[:, None] * springs.slab)
@@ -62,10 +62,12 @@ class StaticTrack:
         fields = q[:, [0, 2, 4]]
         value, slope = (np.einsum("wn,rfnk->wrfk", shape[kind], fields) for kind in (0, 1))
         wheels = np.arange(W)[:, None], np.arange(2)
-        value = np.ascontiguousarray(value)  # what follows changes it in place
+        value = np.ascontiguousarray(value)  # changed in place below
         missing = value.reshape(W, 2, 3, W, 2, 3)
         for m, compliance in enumerate(model.constants[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1]):
-            missing[(*wheels, m, *wheels, m)] += compliance  # of the modes left out: a wheel feels its own force only
+            missing[(*wheels, m, *wheels, m)] += (
+                compliance  # of the truncated modes: a wheel responds to its own force only
+            )
         self._compliance = np.concatenate([value, slope, np.zeros_like(value)], axis=2)
 
     def under_wheels(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -93,16 +95,16 @@ class StaticTrack:
         return self.respond(self._place @ force.ravel())
 
     def respond(self, load: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """As :meth:`motion`, under generalised forces on the rails' coordinates, shape (10 N,)."""
+        """Generalised coordinates, as :meth:`motion`, under generalised forces on the rails, shape (10 N,)."""
         q = la.lu_solve(self._lu, load)
-        slabs = np.zeros((self.model.given.slots, int(self.model.dims[at.SLAB_DOFS])))
+        slabs = np.zeros((self.model.ingredients.slots, int(self.model.dims[at.SLAB_DOFS])))
         for slot, lu, to_slab in self._slabs:
             slabs[slot] = -la.lu_solve(lu, to_slab @ q)
         return q.reshape(2, -1), slabs
 
-    def _springs(self, state: State, s0: float, train: int) -> dict[int, _Springs]:
+    def _springs(self, state: SineState, s0: float, train: int) -> dict[int, _Springs]:
         """Springs of the seats in the window, by slab."""
-        g = self.model.given
+        g = self.model.ingredients
         d, per_slab = g.slab.fastening_pitch, g.slab.fastenings
         j = np.arange(state.seat_scale.shape[1])
         s = np.asarray(s0 + j * d, dtype=np.float64)
@@ -144,8 +146,8 @@ def _slab_springs(
         phi: Rail shape at the seats, shape (k, N).
         rate: Its convective rate -V d/ds, shape (k, N).
     """
-    fastening, r, n = model.given.fastening, model.given.rail, model.given.modes
-    a, b, design = r.arm_fastening, r.half_base, model.given.designs.matrices[0]
+    fastening, r, n = model.ingredients.fastening, model.ingredients.rail, model.ingredients.modes
+    a, b, design = r.arm_fastening, r.half_base, model.ingredients.designs.matrices[0]
     kinds = (  # arms on w, v, theta_x; stiffness, damping
         ((1.0, 0.0, 0.0), fastening.vertical_stiffness, fastening.vertical_damping),
         ((0.0, 0.0, b), fastening.vertical_stiffness, fastening.vertical_damping),

@@ -1,27 +1,27 @@
-"""Set-up of a run: the longest time step that is stable, and the model at that step."""
+"""Longest stable time step of a scenario, and the model at that step."""
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from tiengine.engine import backend
+from tiengine.engine.chunk import Chunk
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.engine.stability import TOLERATED_GROWTH, energy_growth
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
-from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
+from tiengine.irregularity.irregularity import IrregularityParams, check_step, shortest_wavelength
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
 from tiengine.parameters.errors import InputError
-from tiengine.scenario.scenario import Scenario, check_wavelength, load_scenario, to_toml
+from tiengine.scenario.scenario import Scenario, check_wavelength, to_toml
 from tiengine.scenario.tables import Output
 
 __all__ = ["AUTO_STEPS", "prepare"]
 
 AUTO_STEPS = (2e-4, 1e-4, 5e-5, 2.5e-5)
-"""Steps that "auto" tries, the longest first: 2e-4 s keeps wheel forces within 0.3 % of their peak (README)."""
+"""Steps that "auto" tries [s], the longest first: 2e-4 s keeps wheel forces within 0.3 % of their peak (README)."""
 
 
 def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) -> tuple[Model, float]:
@@ -30,58 +30,73 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     Args:
         scenario: Checked scenario of one train.
         public_launch: Public Taichi calls only.
-        trains: How many of them are advanced together; the step does not depend on it.
+        trains: Trains advanced together; the step does not depend on their number.
 
     Returns:
         The model, and the wall time of compiling the step's kernels [s].
 
     Raises:
-        InputError: The step asked for is unstable or too long for the irregularity, or none is short enough.
+        InputError: The scenario's step is unstable or too long for the irregularity, or none is short enough.
     """
     backend.start(scenario.numerics.threads)
-    asked = scenario.numerics.time_step
+    wanted = scenario.numerics.time_step
     V = scenario.train.speed.at(scenario.rear + scenario.centre_in_window)[0]
     fastest = scenario.train.speed.fastest
     jit = 0.0
-    track = make_irregularity(scenario.irregularity, 0.0)  # a measured series has its own shortest wave
-    for dt in AUTO_STEPS if asked == "auto" else (float(asked),):
+    shortest = shortest_wavelength(scenario.irregularity)
+    for dt in AUTO_STEPS if wanted == "auto" else (float(wanted),):
         try:
             check_wavelength(scenario, dt)
-            track.check_step(fastest, dt)
+            check_step(shortest, fastest, dt)
         except InputError:
-            if asked == "auto" and dt != AUTO_STEPS[-1]:
+            if wanted == "auto" and dt != AUTO_STEPS[-1]:
                 continue
             raise
-        given = replace(_ingredients(_without_speed(scenario)), newmark=Newmark(dt))
-        model = build_model(given, fastest)
+        parts = replace(_ingredients(_Key.of(scenario)), newmark=Newmark(dt))
+        model = build_model(parts, fastest)
         if jit == 0.0:
-            jit = Stepper(model, State.at_rest(model), Chunk.empty(model, 1, 1, 1), public=public_launch).compile()
+            chunk = Chunk.empty(parts, 1, 1, 1)
+            jit = SineStepper(model, SineState.at_rest(model), chunk, public=public_launch).compile()
         growth = energy_growth(model, fastest)
         if growth <= TOLERATED_GROWTH:
             if trains > 1:
-                model = build_model(replace(given, trains=trains), V)
+                model = build_model(replace(parts, trains=trains), V)
             elif V != fastest:
                 model.refactor(V)
             return model, jit
     raise InputError(
-        f"numerics.time_step = {asked}: unstable; free vibration of the track grows by a factor {growth:.3g} within"
+        f"numerics.time_step = {wanted}: unstable; free vibration of the track grows by a factor {growth:.3g} within"
         " 80 steps; choose a shorter step, more passes or fewer modes_per_metre"
     )
 
 
-def _without_speed(scenario: Scenario) -> str:
-    """A scenario as text, less what the ingredients of a model do not depend on."""
-    update = {
-        "train": scenario.train.model_copy(update={"speed_kmh": 100.0}),
-        "numerics": scenario.numerics.model_copy(update={"time_step": "auto"}),
-        "irregularity": IrregularityParams(spectrum="none"),
-        "output": Output(),
-        "gauges": (),
-    }
-    return to_toml(scenario.model_copy(update=update))
+@dataclass(frozen=True)
+class _Key:
+    """A scenario without the keys that the ingredients of a model do not depend on; compared by its text.
+
+    Attributes:
+        text: The scenario as TOML.
+        scenario: The scenario itself.
+    """
+
+    text: str
+    scenario: Scenario = field(compare=False)
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> _Key:
+        """Key of a scenario."""
+        update = {
+            "train": scenario.train.model_copy(update={"speed_kmh": 100.0}),
+            "numerics": scenario.numerics.model_copy(update={"time_step": "auto"}),
+            "irregularity": IrregularityParams(spectrum="none"),
+            "output": Output(),
+            "gauges": (),
+        }
+        reduced = scenario.model_copy(update=update)
+        return cls(to_toml(reduced), reduced)
 
 
 @lru_cache(maxsize=2)
-def _ingredients(toml: str) -> Ingredients:
-    """Ingredients at some time step; kept, since the contact table takes seconds and outlives a change of speed."""
-    return ingredients(load_scenario(tomllib.loads(toml)), AUTO_STEPS[0])
+def _ingredients(key: _Key) -> Ingredients:
+    """Ingredients at the first time step; cached, since the contact table takes seconds and holds for all speeds."""
+    return ingredients(key.scenario, AUTO_STEPS[0])

@@ -14,6 +14,7 @@ from tiengine.figures.palette import BLACK, ORANGE, PURPLE
 from tiengine.figures.style import LEFT, RIGHT, Look, new_figure
 from tiengine.indices.extremes import Extremes, read_extremes
 from tiengine.indices.train_record import AbsentError, Train
+from tiengine.parameters.conventions import SIDES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["draw"]
 
 KEY = "output.envelopes"
-SIDES = ((0, LEFT, "left"), (1, RIGHT, "right"))
+LOOKS = (LEFT, RIGHT)
 
 
 @of_one_train
@@ -78,8 +79,8 @@ def _line(axes: Axes, extremes: Extremes, values: Any, look: Look, scale: float,
 
 
 def _vertical(axes: Axes, seats: Extremes) -> None:
-    for side, look, label in SIDES:
-        _line(axes, seats, seats["largest_vertical_force"][:, side], look, 1e-3, label=label)
+    for side, look in enumerate(LOOKS):
+        _line(axes, seats, seats["largest_vertical_force"][:, side], look, 1e-3, label=SIDES[side])
         _line(axes, seats, seats["smallest_vertical_force"][:, side], look, 1e-3, linewidth=0.5)
     axes.axhline(1e-3 * seats.sound_median("largest_vertical_force"), color=BLACK, linewidth=0.7, linestyle=":",
                  label="median of sound seats")  # fmt: skip
@@ -87,7 +88,7 @@ def _vertical(axes: Axes, seats: Extremes) -> None:
 
 
 def _lateral(axes: Axes, seats: Extremes) -> None:
-    for side, look, _ in SIDES:
+    for side, look in enumerate(LOOKS):
         for name in ("largest_lateral_force", "smallest_lateral_force"):
             _line(axes, seats, seats[name][:, side], look, 1e-3, linewidth=0.8 if name[0] == "l" else 0.5)
     axes.set(ylabel="[kN]", title="Fastenings: largest lateral force to the right; thin lines: to the left")

@@ -12,6 +12,7 @@ from tiengine.figures.palette import BLACK, SKY
 from tiengine.figures.style import LEFT, RIGHT, new_figure
 from tiengine.indices.train_record import AbsentError, Train
 from tiengine.parameters.arrays import Reals
+from tiengine.parameters.conventions import SIDES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +23,6 @@ __all__ = ["draw", "largest_by_stretch"]
 MOST_ROWS = 400  # of a picture
 SLICE = 200  # snapshots in memory at a time
 COLOURS = "cividis"  # monotonic lightness: readable in grey and with colour vision deficiency
-SIDES = ("left", "right")
 
 
 @of_one_train

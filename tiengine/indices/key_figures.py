@@ -10,10 +10,9 @@ import numpy as np
 from tiengine.indices.extremes import Extremes, read_extremes
 from tiengine.indices.train_record import AbsentError, Samples, Train
 from tiengine.parameters.arrays import Reals
+from tiengine.parameters.conventions import SIDES
 
 __all__ = ["KeyFigure", "Summary", "key_figures", "summarise"]
-
-SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from typing import Annotated, Literal, Protocol
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
-from tiengine.irregularity.given_track import FunctionTrack, MeasuredTrack, UserFunction, function_spline, smooth_step
 from tiengine.irregularity.measured_files import band_passed, read_series
+from tiengine.irregularity.measured_track import MeasuredTrack, smooth_step
 from tiengine.irregularity.random_track import BlockSpline, noise_spline
 from tiengine.irregularity.spectrum import (
     CHANNELS,
@@ -24,6 +24,7 @@ from tiengine.irregularity.spectrum import (
     load_spectrum,
     spectrum_names,
 )
+from tiengine.irregularity.track_function import TrackFunction
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.quantity import Params, Q
@@ -31,11 +32,14 @@ from tiengine.parameters.quantity import Params, Q
 __all__ = [
     "HALF_BASE",
     "PATCH_HALF_LENGTH",
+    "STEPS_PER_WAVE",
     "Irregularity",
     "IrregularityParams",
     "at_wheels",
-    "from_function",
+    "check_reach",
+    "check_step",
     "make_irregularity",
+    "shortest_wavelength",
 ]
 
 HALF_BASE = 0.75
@@ -44,14 +48,20 @@ HALF_BASE = 0.75
 PATCH_HALF_LENGTH = 6e-3
 """Half length of the contact patch along the rail [m] in the filter of short waves (6 to 7 mm at 70 kN)."""
 
+STEPS_PER_WAVE = 8.0
+"""Fewest time steps in which a wheel may pass the shortest wavelength (MODEL §6)."""
+
 _ROUGHNESS_BLOCK = 64.0  # m, half a block at least: a train then lies in a few blocks, not hundreds
 _MOST_BANDWIDTH = 1e4  # longest over shortest wave; a block then takes 40 MB
 
 
 class IrregularityParams(Params):
-    """Which irregularity a track has; a ``file`` takes the place of the ``spectrum``.
+    """Parameters of the track irregularity; a ``file`` replaces the ``spectrum``.
 
-    A file's columns and the keys ``file_...`` are explained in docs/files.md.
+    A Python function replaces both: ``tiengine.run(scenario, irregularity=f)`` sets ``function`` to its name, which
+    records in the result that the track was given by a function; it cannot be run from a file.
+
+    The columns of a file and the keys ``file_...`` are described in docs/files.md.
 
     ``short_wave`` adds the ISO 3095 limit to the vertical of each rail, from its longest band (0.45 m) or
     ``wavelength_min``, whichever is shorter, down to ``short_wave_min``.
@@ -60,26 +70,35 @@ class IrregularityParams(Params):
     spectrum: Annotated[
         str, Field(description='preset of kind irregularity (`tiengine list irregularity`), or "none"')
     ] = "german_low"
-    seed: Annotated[int, Q("-", "names the realisation", ge=0, le=2**63 - 1)] = 1
+    seed: Annotated[int, Q("-", "selects the realisation", ge=0, le=2**63 - 1)] = 1
     wavelength_min: Annotated[float, Q("m", "shortest wave of the spectrum", gt=0, le=1e4)] = 1.0
     wavelength_max: Annotated[float, Q("m", "longest wave of the spectrum", gt=0, le=1e4, validate_default=True)] = (
         120.0
     )
-    two_sided: Annotated[bool, Field(description="the spectrum's constants are those of a two-sided density")] = False
+    two_sided: Annotated[
+        bool, Field(description="the constants of the spectrum are read as those of a two-sided density")
+    ] = False
     scale: Annotated[float, Q("-", "factor on all amplitudes", ge=0)] = 1.0
-    percentile: Annotated[float | None, Q("-", "of the Chinese spectrum; 0.632: mean", gt=0, lt=1)] = None
-    short_wave: Annotated[bool, Field(description="adds the rail roughness of ISO 3095, see above")] = False
+    percentile: Annotated[float | None, Q("-", "percentile of the Chinese spectrum; 0.632 is its mean", gt=0, lt=1)] = (
+        None
+    )
+    short_wave: Annotated[bool, Field(description="adds rail roughness at the ISO 3095 limit, see above")] = False
     short_wave_min: Annotated[float, Q("m", "shortest wave of the rail roughness", gt=0, validate_default=True)] = 0.08
-    taper: Annotated[float, Q("m", "length over which the irregularity begins", gt=0)] = 30.0
+    taper: Annotated[float, Q("m", "length over which the irregularity grows to full amplitude", gt=0)] = 30.0
     file: Annotated[
         str | None,
         Field(description="measured track as CSV (docs/files.md), relative to the scenario", max_length=4096),
     ] = None
-    file_unit: Annotated[Literal["m", "mm"], Field(description="of columns that state none")] = "m"
+    function: Annotated[
+        str | None, Field(description="name of the Python function that gives the track; set by `tiengine.run`")
+    ] = None
+    file_unit: Annotated[Literal["m", "mm"], Field(description="unit of columns that state none")] = "m"
     file_start: Annotated[float | None, Q("m", "mileage of the file at chainage zero")] = None
-    file_reverse: Annotated[bool, Field(description="the train runs through the rows from last to first")] = False
-    file_vertical_up: Annotated[bool, Field(description="verticals are up positive in the file")] = False
-    file_band_pass: Annotated[bool, Field(description="keeps waves from wavelength_min to wavelength_max only")] = False
+    file_reverse: Annotated[bool, Field(description="the train passes the rows from last to first")] = False
+    file_vertical_up: Annotated[bool, Field(description="vertical columns are positive upwards")] = False
+    file_band_pass: Annotated[
+        bool, Field(description="keeps only wavelengths from wavelength_min to wavelength_max")
+    ] = False
 
     @field_validator("spectrum")
     @classmethod
@@ -106,6 +125,13 @@ class IrregularityParams(Params):
             load_spectrum(info.data["spectrum"]).mean_factor(percentile)
         return percentile
 
+    @field_validator("function")
+    @classmethod
+    def _is_alone(cls, function: str | None, info: ValidationInfo) -> str | None:
+        if function is not None and info.data.get("file") is not None:
+            raise ValueError("must not be set together with irregularity.file")
+        return function
+
     @field_validator("short_wave_min")
     @classmethod
     def _is_within_limit(cls, short_wave_min: float, info: ValidationInfo) -> float:
@@ -115,24 +141,29 @@ class IrregularityParams(Params):
         return short_wave_min
 
     @property
+    def has_spectrum(self) -> bool:
+        """Whether the track, apart from rail roughness, is random."""
+        return self.spectrum != "none" and self.file is None and self.function is None
+
+    @property
     def short_wave_max(self) -> float:
         """Longest wave of the rail roughness [m]."""
         return _longest_roughness(self.wavelength_min)
 
     @property
     def shortest_wavelength(self) -> float:
-        """Shortest wave made from spectra [m]; infinite where there is none."""
-        track = self.wavelength_min if self.spectrum != "none" and self.file is None else np.inf
+        """Shortest wavelength generated from spectra [m]; infinite where none is used."""
+        track = self.wavelength_min if self.has_spectrum else np.inf
         return min(track, self.short_wave_min if self.short_wave else np.inf)
 
 
 def _longest_roughness(wavelength_min: float) -> float:
-    """Longest wave of the limit [m], or where the spectrum of the track begins."""
+    """Longest wavelength of the roughness [m]: that of the limit, or the shortest of the track spectrum."""
     return min(wavelength_min, load_roughness().longest)
 
 
 class _Track(Protocol):
-    """Part of a track: values and slopes of its channels at chainages."""
+    """Contribution to a track: values and slopes of its channels at chainages."""
 
     def evaluate(self, x: Reals) -> tuple[Reals, Reals]: ...
 
@@ -149,8 +180,20 @@ class _Roughness:
         return _from_rails(value), _from_rails(slope)
 
 
+class _Scaled:
+    """A contribution times a factor."""
+
+    def __init__(self, track: _Track, factor: float) -> None:
+        self._track, self._factor = track, factor
+
+    def evaluate(self, x: Reals) -> tuple[Reals, Reals]:
+        """Values and slopes of the four channels, each of shape (n, 4)."""
+        value, slope = self._track.evaluate(x)
+        return self._factor * value, self._factor * slope
+
+
 def _from_rails(z: Reals) -> Reals:
-    """Four channels of heights of the left and right railhead, (n, 2) to (n, 4)."""
+    """Convert heights of the left and right railhead to the four channels, (n, 2) to (n, 4)."""
     channels = np.zeros((len(z), len(CHANNELS)))
     channels[:, 0] = 0.5 * (z[:, 0] + z[:, 1])
     channels[:, 2] = (z[:, 1] - z[:, 0]) / (2.0 * HALF_BASE)
@@ -158,7 +201,7 @@ def _from_rails(z: Reals) -> Reals:
 
 
 class Irregularity:
-    """Irregularity at any chainage; build it with :func:`make_irregularity` or :func:`from_function`."""
+    """Irregularity at any chainage; build it with :func:`make_irregularity`."""
 
     def __init__(
         self,
@@ -168,13 +211,13 @@ class Irregularity:
         shortest: float,
         reach: tuple[float, float] = (-np.inf, np.inf),
     ) -> None:
-        """Add up parts.
+        """Sum contributions.
 
         Args:
-            parts: What is added.
+            parts: Contributions to be summed.
             taper_start: Chainage before which the track is smooth [m].
             taper: Length over which the irregularity begins [m].
-            shortest: Shortest wavelength of the parts [m]; infinite where not known.
+            shortest: Shortest wavelength of the contributions [m]; infinite where unknown.
             reach: Chainages where a measured track begins and ends [m].
         """
         self.start, self.end = reach
@@ -182,7 +225,7 @@ class Irregularity:
         self.taper_start, self.taper, self.shortest_wavelength = taper_start, taper, shortest
 
     def sample(self, x: Reals) -> Reals:
-        """Irregularity at chainages; the same bits for a chainage in any array and any order.
+        """Evaluate at chainages; a chainage gives the same bits in any array and any order.
 
         Args:
             x: Chainages [m], any shape, any order, any sign.
@@ -211,32 +254,39 @@ class Irregularity:
             value *= T[:, None]
         return out.reshape(*chainage.shape, -1)
 
-    def check_step(self, speed: float, dt: float) -> None:
-        """Refuse waves that the time step cannot follow.
 
-        Args:
-            speed: Highest speed V [m/s].
-            dt: Time step [s].
-
-        Raises:
-            InputError: The shortest wavelength is below 8 V dt.
-        """
-        least = 8.0 * speed * dt
-        if self.shortest_wavelength < least:
-            raise InputError(
-                f"irregularity: shortest wavelength = {self.shortest_wavelength:g} m: must be >= 8 V dt = {least:.4g} m"
-            )
-
-
-def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregularity:
-    """Irregularity of a scenario: a file or else a spectrum, and the roughness below it.
+def check_step(shortest: float, speed: float, dt: float, name: str = "irregularity: shortest wavelength") -> None:
+    """Refuse wavelengths that the time step cannot resolve.
 
     Args:
-        params: What to make; a ``file`` takes the spectrum's place.
-        taper_start: Chainage where the irregularity begins [m], ahead of the leading wheel.
+        shortest: Shortest wavelength [m].
+        speed: Highest speed V [m/s].
+        dt: Time step [s].
+        name: Name of the wavelength in the message.
 
     Raises:
-        InputError: The file breaks a rule.
+        InputError: The wavelength is below 8 V dt (MODEL §6).
+    """
+    least = STEPS_PER_WAVE * speed * dt
+    if shortest < least:
+        raise InputError(
+            f"{name} = {shortest:g}: must be at least {STEPS_PER_WAVE:g} V dt = {least:.4g} m"
+            f" at a time step of {dt:g} s; choose a smaller step or a longer wave"
+        )
+
+
+def make_irregularity(
+    params: IrregularityParams, taper_start: float, function: TrackFunction | None = None
+) -> Irregularity:
+    """Build the irregularity of a scenario: a function, a file or a spectrum, plus the rail roughness.
+
+    Args:
+        params: Parameters; a ``file`` replaces the spectrum.
+        taper_start: Chainage where the irregularity begins [m], ahead of the leading wheel.
+        function: Function that the parameters name.
+
+    Raises:
+        InputError: The file breaks a rule, or the function is missing.
     """
     parts: list[_Track] = []
     shortest, reach = params.shortest_wavelength, (-np.inf, np.inf)
@@ -244,47 +294,66 @@ def make_irregularity(params: IrregularityParams, taper_start: float) -> Irregul
         measured = MeasuredTrack(_measured_series(params, params.file), params.taper)
         if measured.end <= taper_start:
             raise InputError(
-                f"irregularity.file = {params.file!r}: ends at chainage {measured.end:g} m, before the train's way"
+                f"irregularity.file = {params.file!r}: ends at chainage {measured.end:g} m, before the run"
                 " begins; set file_start to the mileage of chainage zero"
             )
         parts.append(measured)
         reach = (measured.start, measured.end)
         shortest = min(shortest, max(measured.shortest, params.wavelength_min if params.file_band_pass else 0.0))
+    elif params.function is not None:
+        if function is None:
+            raise InputError(
+                f"irregularity.function = {params.function!r}: the Python function itself is missing; pass it as"
+                " tiengine.run(scenario, irregularity=function)"
+            )
+        parts.append(_Scaled(function.track(), params.scale))
     elif params.spectrum != "none":
         band = (params.wavelength_min, params.wavelength_max)
         parts.append(noise_spline(params.seed, range(4), _track_densities(params), band))
     if params.short_wave:
         roughness = load_roughness()
 
-        def felt(Omega: Reals) -> Reals:
+        def filtered(Omega: Reals) -> Reals:
             return params.scale**2 * roughness.density(Omega) * contact_filter(Omega, PATCH_HALF_LENGTH)
 
         band = (params.short_wave_min, params.short_wave_max)
-        rails = noise_spline(params.seed, (4, 5), (felt, felt), band, shortest_block=_ROUGHNESS_BLOCK)
+        rails = noise_spline(params.seed, (4, 5), (filtered, filtered), band, shortest_block=_ROUGHNESS_BLOCK)
         parts.append(_Roughness(rails))
     return Irregularity(parts, taper_start, params.taper, shortest, reach)
 
 
+def shortest_wavelength(params: IrregularityParams) -> float:
+    """Shortest wavelength that the time step must resolve [m]; infinite where unknown, as for a function.
+
+    Args:
+        params: Parameters; a file is read.
+
+    Raises:
+        InputError: The file breaks a rule.
+    """
+    return params.shortest_wavelength if params.file is None else make_irregularity(params, -np.inf).shortest_wavelength
+
+
 def check_reach(tracks: Iterable[Irregularity], end: float) -> None:
-    """Refuse a measured track that the train never comes to.
+    """Refuse a measured track that the train never reaches.
 
     Args:
         tracks: Irregularity of each train.
-        end: Chainage of the leading wheel at the end of the way [m].
+        end: Chainage of the leading wheel at the end of the run [m].
 
     Raises:
-        InputError: A track begins behind it.
+        InputError: A track begins beyond it.
     """
     for track in tracks:
         if track.start >= end:
             raise InputError(
-                f"irregularity.file: begins at chainage {track.start:g} m: must be before the end of the way, {end:g}"
+                f"irregularity.file: begins at chainage {track.start:g} m: must be before the end of the run, {end:g}"
                 " m; set file_start to the mileage of chainage zero"
             )
 
 
 def _measured_series(params: IrregularityParams, file: str) -> Reals:
-    """Chainage and channels of a file as the train is to meet them, shape (n, 5)."""
+    """Read chainage and channels of a file in the direction of travel, shape (n, 5)."""
     series = read_series(
         file,
         unit=params.file_unit,
@@ -298,7 +367,7 @@ def _measured_series(params: IrregularityParams, file: str) -> Reals:
 
 
 def _track_densities(params: IrregularityParams) -> list[Density]:
-    """Densities as realised: scaled, one- or two-sided, the rails' heights as the patch feels them."""
+    """Densities of the realisation: scaled, one- or two-sided, rail heights filtered by the contact patch."""
     spectrum = load_spectrum(params.spectrum)
     factor = params.scale**2 * (2.0 if params.two_sided else 1.0)
     if params.percentile is not None:
@@ -311,37 +380,8 @@ def _track_densities(params: IrregularityParams) -> list[Density]:
     return [density(channel) for channel in CHANNELS]
 
 
-def from_function(
-    f: UserFunction,
-    *,
-    slopes: UserFunction | None = None,
-    taper_start: float,
-    taper: float = 30.0,
-    spacing: float = 0.05,
-) -> Irregularity:
-    """Irregularity given by a user's function.
-
-    Args:
-        f: Chainages (n,) to z_v, y_a, theta, g, each (n,) or a number.
-        slopes: The derivatives of f by x, in the same form. Without them f is replaced by the C2 spline
-            through its values at multiples of ``spacing``, with an error of (2 pi spacing/lambda)^4/384.
-        taper_start: Chainage where the irregularity begins [m].
-        taper: Length over which it begins [m].
-        spacing: Grid of the spline [m].
-
-    Raises:
-        InputError: ``taper`` or ``spacing`` is not positive; later, when sampled: f does not give four finite
-            series.
-    """
-    for name, value in (("taper", taper), ("spacing", spacing)):
-        if not value > 0.0:
-            raise InputError(f"irregularity.{name} = {value:g}: must be > 0")
-    track = FunctionTrack(f, slopes) if slopes is not None else function_spline(f, spacing)
-    return Irregularity([track], taper_start, taper, np.inf)
-
-
 def at_wheels(channels: Reals) -> Reals:
-    """Irregularity of the left and right railhead.
+    """Convert the channels to the irregularity of the left and right railhead.
 
     Args:
         channels: Result of :meth:`Irregularity.sample`, shape (..., 8).

@@ -1,21 +1,21 @@
 """Measured irregularity from a CSV file.
 
-The first line that is neither blank nor a comment (``#``) names the columns, in any order, each with its unit in
-brackets if it likes: ``distance [km], vertical_left [mm], vertical_right [mm], cross_level [mm]``.
+The first line that is neither blank nor a comment (``#``) names the columns, in any order, each optionally with its
+unit in brackets: ``distance [km], vertical_left [mm], vertical_right [mm], cross_level [mm]``.
 
-| columns | what they are |
+| columns | meaning |
 |---|---|
-| ``x``, ``distance``, ``chainage``, ``mileage`` | along the track [m]; rising or falling throughout, one of them |
+| ``x``, ``distance``, ``chainage``, ``mileage`` | along the track [m]; rising or falling throughout; exactly one |
 | ``z_v`` or ``vertical``; ``vertical_left`` and ``vertical_right`` | height of the rails, down positive |
 | ``theta`` [rad] or ``cross_level`` | left rail above right; as a height over 1.5 m |
 | ``y_a`` or ``alignment``; ``alignment_left`` and ``alignment_right`` | position of the rails, right positive |
 | ``gauge`` | deviation from the nominal gauge |
 
-Left and right are seen in the order of the rows. With both verticals the cross level follows from them, and gauge from
-both alignments, unless they have columns of their own. What is absent is zero.
+Left and right refer to the order of the rows. With both verticals the cross level follows from them, and the gauge from
+both alignments, unless they have columns of their own. Absent channels are zero.
 
-A train that runs through the rows against their order (``reverse``) finds left and right changed over: alignment and
-cross level change sign. Its chainage always rises; it is zero at the mileage ``start``.
+For a train that passes the rows against their order (``reverse``) left and right are exchanged: alignment and cross
+level change sign. Chainage always rises; it is zero at the mileage ``start``.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ __all__ = ["LEVEL_BASE", "band_passed", "read_series"]
 LEVEL_BASE = 1.5
 """Distance over which a cross level is a height [m]: 2 b_i."""
 LARGEST_GAP = 3.0  # times the median step
-LARGEST_DEVIATION = 0.5  # m: gauge beyond is the gauge itself, not its deviation
+LARGEST_DEVIATION = 0.5  # m: a larger value is the gauge itself, not its deviation
 LARGEST_CHAINAGE = 1e7  # m
-LARGEST_HEIGHT = 1e4  # m or rad, absolute levels included, of which a band-pass leaves little
+LARGEST_HEIGHT = 1e4  # m or rad; absolute levels are allowed, since a band-pass removes them
 FILTER_ORDER = 4
 
 _ALONG = ("x", "distance", "chainage", "mileage")
@@ -63,9 +63,9 @@ _CHANNELS: dict[str, Callable[[dict[str, Reals]], Reals]] = {
     "gauge": lambda c: c["gauge"],
     "widening": lambda c: c["alignment_right"] - c["alignment_left"],
 }
-"""A channel from columns; with KeyError where one is absent."""
-_WAYS = (("z_v", "vertical"), ("y_a", "alignment"), ("theta", "cross_level", "twist"), ("gauge", "widening"))
-"""Ways to each channel, the first whose columns are there is taken."""
+"""Formulas of the channels from columns; KeyError where a column is absent."""
+_SOURCES = (("z_v", "vertical"), ("y_a", "alignment"), ("theta", "cross_level", "twist"), ("gauge", "widening"))
+"""Formulas of each channel; the first whose columns are present is used."""
 
 
 def read_series(
@@ -82,9 +82,9 @@ def read_series(
         path: CSV file.
         unit: Unit of heights, positions and gauge whose column names none: ``"m"`` or ``"mm"``.
         start: Mileage [m] at chainage zero; None for 0 m where the train runs towards higher mileage, else for the
-            mileage at which it meets the file.
-        reverse: The train runs through the rows from the last to the first.
-        vertical_up: Verticals are up positive in the file.
+            mileage at which it enters the file.
+        reverse: The train passes the rows from the last to the first.
+        vertical_up: Vertical columns are positive upwards.
 
     Returns:
         Chainage, vertical, alignment, cross level, gauge [m, m, m, rad, m], shape (n, 5), n >= 4; chainage rises.
@@ -115,25 +115,25 @@ def read_series(
     for name in names:
         if vertical_up and name in ("z_v", "vertical_left", "vertical_right"):
             columns[name] = -columns[name]
-    channels = [_channel(columns, ways, path, lines[0][0]) for ways in _WAYS]
+    channels = [_channel(columns, sources, path, lines[0][0]) for sources in _SOURCES]
     return _along_the_run(np.stack([columns["x"], *channels], axis=1), start, reverse)
 
 
 def _cells(line: str) -> list[str]:
-    """The texts between the commas of a line."""
+    """Split a line at its commas."""
     cells = next(csv.reader([line])) if '"' in line else line.split(",")
     return [cell.strip() for cell in cells]
 
 
 def _header(path: str | Path, number: int, cells: list[str], unit: str) -> tuple[list[str], Reals]:
-    """Names of the columns and the factors that make them SI."""
+    """Read the names of the columns and their factors to SI units."""
     names, factors = [], []
     for cell in cells:
         found = re.fullmatch(r"([^\[(]*?)\s*(?:[\[(]\s*(\w*)\s*[\])])?", cell)
-        given, name_unit = (found[1], found[2]) if found else (cell, None)
-        if given not in _NAMES:
-            raise InputError(f"{path}, line {number}: column {cell!r}: unknown{nearest(given, _NAMES)}")
-        name = _SAME.get(given, given)
+        label, name_unit = (found[1], found[2]) if found else (cell, None)
+        if label not in _NAMES:
+            raise InputError(f"{path}, line {number}: column {cell!r}: unknown{nearest(label, _NAMES)}")
+        name = _SAME.get(label, label)
         allowed = ("m", "km") if name == "x" else ("rad", "mrad") if name == "theta" else ("m", "mm")
         if name_unit is not None and name_unit not in allowed:
             raise InputError(f"{path}, line {number}: column {cell!r}: its unit must be {' or '.join(allowed)}")
@@ -142,12 +142,14 @@ def _header(path: str | Path, number: int, cells: list[str], unit: str) -> tuple
     if len(set(names)) < len(names):
         raise InputError(f"{path}, line {number}: a column is named twice")
     if "x" not in names or len(names) < 2:
-        raise InputError(f"{path}, line {number}: needs column 'x' and one of z_v, y_a, theta, gauge or their like")
+        raise InputError(
+            f"{path}, line {number}: needs column 'x' and one of z_v, y_a, theta, gauge or their equivalents"
+        )
     return names, np.array(factors)
 
 
 def _row(path: str | Path, number: int, cells: list[str], names: list[str]) -> list[float]:
-    """The numbers of a line, checked."""
+    """Convert a line to finite numbers."""
     if len(cells) != len(names):
         raise InputError(f"{path}, line {number}: {len(cells)} values; the header names {len(names)} columns")
     values = numbers_of(cells)
@@ -159,23 +161,23 @@ def _row(path: str | Path, number: int, cells: list[str], names: list[str]) -> l
 
 def _check_distance(path: str | Path, x: Reals, numbers: Sequence[int]) -> None:
     """Refuse repeated, turning and missing distances."""
-    way, word = (1.0, ">") if np.median(np.diff(x)) >= 0.0 else (-1.0, "<")
-    step = way * np.diff(x)
+    sign, relation = (1.0, ">") if np.median(np.diff(x)) >= 0.0 else (-1.0, "<")
+    step = sign * np.diff(x)
     back = np.flatnonzero(step <= 0.0)
     if back.size:
         i = int(back[0]) + 1
-        raise InputError(f"{path}, line {numbers[i]}: x = {x[i]:g}: must be {word} the x before it")
+        raise InputError(f"{path}, line {numbers[i]}: x = {x[i]:g}: must be {relation} the x before it")
     gaps = np.flatnonzero(step > LARGEST_GAP * np.median(step))
     if gaps.size:
         i = int(gaps[0]) + 1
         raise InputError(
-            f"{path}, line {numbers[i]}: x = {x[i]:g}: a gap of {step[i - 1]:g} m where {np.median(step):g} m is the"
-            " rule; fill it or cut the file there"
+            f"{path}, line {numbers[i]}: x = {x[i]:g}: a gap of {step[i - 1]:g} m; the usual step is"
+            f" {np.median(step):g} m; fill the gap or cut the file there"
         )
 
 
 def _check_gauge(path: str | Path, gauge: Reals | None, numbers: Sequence[int]) -> None:
-    """Refuse the gauge itself."""
+    """Refuse the full gauge where its deviation is expected."""
     large = np.flatnonzero(np.abs(gauge) > LARGEST_DEVIATION) if gauge is not None else np.empty(0, np.intp)
     if gauge is not None and large.size:
         line = f"{path}, line {numbers[large[0]]}"
@@ -183,7 +185,7 @@ def _check_gauge(path: str | Path, gauge: Reals | None, numbers: Sequence[int]) 
 
 
 def _check_size(path: str | Path, names: Sequence[str], rows: Reals, numbers: Sequence[int]) -> None:
-    """Refuse what no track is: its numbers would run away."""
+    """Refuse values outside the range of any track."""
     most = np.array([LARGEST_CHAINAGE if name == "x" else LARGEST_HEIGHT for name in names])
     large = np.argwhere(np.abs(rows) > most)
     if large.size:
@@ -192,36 +194,36 @@ def _check_size(path: str | Path, names: Sequence[str], rows: Reals, numbers: Se
         raise InputError(f"{line}: must be at most {most[j]:g} in magnitude: are its units right?")
 
 
-def _channel(columns: dict[str, Reals], ways: Sequence[str], path: str | Path, number: int) -> Reals:
-    """One channel from the columns there are; zero where there are none."""
-    for way in ways:
+def _channel(columns: dict[str, Reals], sources: Sequence[str], path: str | Path, number: int) -> Reals:
+    """Compute one channel from the available columns; zero where there are none."""
+    for source in sources:
         try:
-            return _CHANNELS[way](columns)
+            return _CHANNELS[source](columns)
         except KeyError:
             continue
     for side in ("left", "right"):
-        for what in ("vertical", "alignment"):
-            if f"{what}_{side}" in columns and what in ways:
-                raise InputError(f"{path}, line {number}: column '{what}_{side}' needs that of the other rail")
+        for direction in ("vertical", "alignment"):
+            if f"{direction}_{side}" in columns and direction in sources:
+                raise InputError(f"{path}, line {number}: column '{direction}_{side}' needs that of the other rail")
     return np.zeros_like(columns["x"])
 
 
 def _along_the_run(series: Reals, start: float | None, reverse: bool) -> Reals:
-    """The series as the train meets it, over its own chainage."""
+    """Order the series by the chainage of the train."""
     if reverse:
         series = series[::-1] * [1.0, 1.0, -1.0, -1.0, 1.0]  # y_a = mean of the rails' y; right is left now
-    way = 1.0 if series[-1, 0] > series[0, 0] else -1.0
+    sign = 1.0 if series[-1, 0] > series[0, 0] else -1.0
     if start is None:
-        start = 0.0 if way > 0.0 else float(series[0, 0])
-    along: Reals = np.column_stack([way * (series[:, 0] - start), series[:, 1:]]) + 0.0  # no -0.0
+        start = 0.0 if sign > 0.0 else float(series[0, 0])
+    along: Reals = np.column_stack([sign * (series[:, 0] - start), series[:, 1:]]) + 0.0  # no -0.0
     return along
 
 
 def band_passed(series: Reals, shortest: float, longest: float) -> Reals:
-    """The waves of a series between two lengths.
+    """Band-pass a series between two wavelengths.
 
     A Butterworth band-pass of order 4 runs over the series forwards and backwards: no phase, half the amplitude at
-    both limits. Steps that differ are made equal by a spline first.
+    both limits. Unequal steps are first resampled by a spline.
 
     Args:
         series: Chainage and channels, shape (n, 1 + channels).

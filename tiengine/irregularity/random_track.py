@@ -37,7 +37,7 @@ _PREFILTER_REACH = 28  # (2 - sqrt 3)^28 = 1e-16
 
 
 class BlockSpline:
-    """Cubic B-splines on the global grid j h; coefficients are asked for in blocks and the last few kept."""
+    """Cubic B-splines on the global grid j h; coefficients are generated in blocks, the last few of which are kept."""
 
     def __init__(
         self, spacing: float, size: int, channels: int, coefficients: Callable[[int], Reals], keep: int
@@ -56,7 +56,7 @@ class BlockSpline:
         self._block = lru_cache(maxsize=keep)(coefficients)
 
     def evaluate(self, x: Reals) -> tuple[Reals, Reals]:
-        """Values and slopes; each is computed from its own x alone, whatever the company.
+        """Evaluate values and slopes; each depends on its own x alone, not on the rest of the array.
 
         Args:
             x: Chainages [m], shape (n,).
@@ -95,7 +95,7 @@ def _weights(t: Reals, h: float) -> tuple[Reals, Reals]:
 
 
 def _combine(c: Reals, i: NDArray[np.int64], weights: Reals, slopes: Reals) -> tuple[Reals, Reals]:
-    """Sum of four terms in a fixed order: the same bits in whatever array a chainage comes, unlike einsum."""
+    """Sum of four terms in a fixed order: a chainage gives the same bits in any array, unlike einsum."""
     value, slope = 0.0, 0.0
     for shift in range(4):
         near = c.take(i + shift, axis=0)
@@ -105,7 +105,7 @@ def _combine(c: Reals, i: NDArray[np.int64], weights: Reals, slopes: Reals) -> t
 
 
 class NoiseBlocks:
-    """Coefficients of Gaussian noise with given densities; see the module's head."""
+    """Coefficients of Gaussian noise with given densities, see the module docstring."""
 
     def __init__(
         self,
@@ -154,9 +154,10 @@ class NoiseBlocks:
         return np.ascontiguousarray(fft.irfft(X, n=2 * self.size, axis=-1).T)
 
     def _gaussian(self, stream: int, b: int) -> NDArray[np.complex128]:
-        """Independent complex Gaussian numbers of unit mean power, one for each bin (Box and Muller).
+        """Draw independent complex Gaussian numbers of unit mean power, one for each bin (Box and Muller).
 
-        Made from the generator's raw integers: NumPy guarantees their stream, not that of normal numbers.
+        They are computed from the raw integers of the generator, whose stream NumPy guarantees; that of its normal
+        numbers it does not.
         """
         key = np.array([self.seed, stream], dtype=np.uint64)
         counter = np.array([0, 0, 0, b % 2**64], dtype=np.uint64)
@@ -193,15 +194,15 @@ def noise_spline(
 
 
 def _keep(length: float) -> int:
-    """Blocks of this length [m] to keep, so that all wheels of a train find theirs."""
+    """Number of blocks of this length [m] to keep so that they cover all wheels of a train."""
     return int(np.ceil(CACHED_LENGTH / length)) + 2
 
 
 def sampled_spline(f: Callable[[Reals], Reals], spacing: float, channels: int) -> BlockSpline:
     """The cubic spline through the values of a function at all multiples of ``spacing``.
 
-    The coefficients c_j = Sum sqrt(3) z^|i| f_(j-i), z = sqrt(3) - 2, need 28 intervals either way: the terms
-    beyond are below rounding.
+    The coefficients c_j = Sum sqrt(3) z^|i| f_(j-i), z = sqrt(3) - 2, need 28 intervals on either side: further
+    terms are below rounding.
 
     Args:
         f: Function of chainages, (n,) to (n, channels).

@@ -3,8 +3,8 @@
 Every density S(Omega) is **one-sided** over the angular wave number Omega = 2 pi / lambda [rad/m]: the
 variance of a band is the integral of S over it. Channels: vertical z_v and alignment y_a [m^2/(rad/m)], cross
 level theta, an angle [rad^2/(rad/m)], gauge [m^2/(rad/m)]. Constants live in
-``tiengine/library/irregularity/*.toml``. Formulas may be evaluated outside the band (``wavelengths``) they
-were drawn up for; the caller chooses the band.
+``tiengine/library/irregularity/*.toml``. Formulas may be evaluated outside their band of validity
+(``wavelengths``); the caller chooses the band.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _SPECTRA = ("german_low", "german_high", "china_ballastless", *(f"fra_{grade}" f
 
 
 class Spectrum(Params):
-    """What all spectra share: a title, where the numbers come from, the band they hold in."""
+    """Base class of the spectra: title, source of the numbers, band of validity."""
 
     title: str
     source: str
@@ -66,8 +66,10 @@ class Spectrum(Params):
         """
 
     def mean_factor(self, percentile: float) -> float:
-        """Factor on S that gives its percentile p; only the Chinese spectrum has percentiles."""
-        raise InputError(f"irregularity.percentile = {percentile:g}: not with the {self.title}, which has none")
+        """Factor on S for its percentile p; only the Chinese spectrum has percentiles."""
+        raise InputError(
+            f"irregularity.percentile = {percentile:g}: must not be set: the {self.title} has no percentiles"
+        )
 
 
 class GermanSpectrum(Spectrum):
@@ -136,7 +138,7 @@ class PowerLaw(Params):
     @model_validator(mode="after")
     def _one_more_piece_than_breaks(self) -> PowerLaw:
         if not len(self.A) == len(self.n) == len(self.breaks) + 1:
-            raise ValueError("needs one A and one n more than there are breaks")
+            raise ValueError("must have one A and one n more than breaks")
         if list(self.breaks) != sorted(set(self.breaks)):
             raise ValueError("breaks must increase")
         return self
@@ -206,8 +208,8 @@ class Roughness(Params):
         """One-sided density [m^2/(rad/m)] at Omega [rad/m]; any shape."""
         variance = (1e-6 * 10.0 ** (np.array([-np.inf, *self.level, -np.inf]) / 20.0)) ** 2
         band = np.floor(10.0 * np.log10(Omega * self.longest / (2 * np.pi))).astype(np.int64)
-        held = np.clip(band + 1, 0, len(self.level) + 1)
-        S: Reals = variance[held] / (Omega * np.log(10.0) / 10.0)
+        clipped = np.clip(band + 1, 0, len(self.level) + 1)
+        S: Reals = variance[clipped] / (Omega * np.log(10.0) / 10.0)
         return S
 
 
@@ -218,13 +220,13 @@ def spectrum_names() -> tuple[str, ...]:
 
 @cache
 def load_spectrum(name: str) -> Spectrum:
-    """A spectrum of the library.
+    """Load a spectrum of the library.
 
     Args:
         name: One of :func:`spectrum_names`.
 
     Raises:
-        InputError: Unknown name; the message says the nearest one.
+        InputError: Unknown name; the message suggests the nearest one.
     """
     if name not in _SPECTRA:
         raise InputError(f"irregularity.spectrum = {name!r}: unknown{nearest(name, (*_SPECTRA, 'none'))}")
@@ -239,7 +241,7 @@ def load_spectrum(name: str) -> Spectrum:
 
 @cache
 def load_roughness(name: str = "iso3095") -> Roughness:
-    """A roughness limit of the library; ISO 3095:2013 is the only one."""
+    """Load a roughness limit of the library; ISO 3095:2013 is the only one."""
     return build(Roughness, load_toml(find_preset("irregularity", name)), f"{name}.toml")
 
 
@@ -277,7 +279,7 @@ def sigma(spectrum: Spectrum, channel: str, wavelength_min: float, wavelength_ma
 
 
 def contact_filter(Omega: Reals, half_length: float) -> Reals:
-    """Share of a roughness' power that a contact patch feels, |H|^2 = 1/[1 + (pi/4)(Omega a)^3].
+    """Share of the power of a roughness that a contact patch transmits, |H|^2 = 1/[1 + (pi/4)(Omega a)^3].
 
     Remington's filter for a circular patch (Remington, J. Acoust. Soc. Am. 81 (1987) 1805; Thompson, Railway
     Noise and Vibration (2009), ch. 5).

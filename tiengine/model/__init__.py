@@ -1,1 +1,1 @@
-"""The constant data of a run, assembled and factorised."""
+"""Constant data of a run, assembled and factorised."""

@@ -1,4 +1,4 @@
-"""From a scenario to what the model is made from."""
+"""Ingredients of a model from a scenario."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ __all__ = ["ingredients"]
 
 
 def ingredients(scenario: Scenario, dt: float) -> Ingredients:
-    """Everything a model needs, built from the scenario's parts.
+    """Build the ingredients of a model from the scenario's parts.
 
     Args:
         scenario: Checked scenario.
         dt: Time step [s].
 
     Raises:
-        InputError: Parts that do not go together.
+        InputError: Parts that do not fit together.
     """
     parts, numerics = scenario.parts, scenario.numerics
     train = assemble(parts.vehicles, parts.centres, series_springs=scenario.train.series_springs or None)
@@ -54,15 +54,15 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
 
 
 def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64]]:
-    """Factors of a row of seats."""
+    """Function that gives the factors of consecutive seats, from the first and their number, shape (count, 2)."""
     failed = scenario.track.failed_fastenings
     return lambda first, count: fastening_factors(failed, first, count)
 
 
 def _designs(scenario: Scenario) -> SlabDesigns:
-    """One design for each slab that has a void or a failed fastening, besides the sound one."""
+    """Sound design of the slabs, and one for each slab with a void or a failed fastening."""
     parts, track = scenario.parts, scenario.track
-    voids = scenario.mortar_voids
+    voids = track.mortar_voids
     matrices, of_void = slab_designs(parts.slab, parts.mortar, voids)
     per_slab = parts.slab.fastenings
     damaged = set(of_void)

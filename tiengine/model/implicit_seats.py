@@ -15,11 +15,28 @@ from tiengine.track.slab_matrices import SlabMatrices
 def smearing(window: RailWindow, spacing: float) -> float:
     """Factor on the smeared fastenings of A_s, so that the passes converge for any number of modes.
 
-    Discrete seats are between 0 and N d / l times as stiff as smeared ones, seen by single wave shapes (all waves of a
-    set that coincide at the seats add up). The iteration contracts if A_s reaches half the upper end; a larger A_s only
-    slows it. Up to 2 / d modes a metre (3.2 for 0.63 m) the factor is one.
+    For a single wave shape, discrete seats are between 0 and N d / l times as stiff as smeared ones (all waves of a set
+    that coincide at the seats add up). The iteration contracts if A_s is at least half the upper bound; a larger A_s
+    only slows it. Up to 2 / d modes per metre (3.2 for 0.63 m) the factor is one.
     """
     return max(1.0, 0.5 * window.modes * spacing / window.length)
+
+
+def smeared_fastening(
+    window: RailWindow, fastening: Fastening, spacing: float, newmark: Newmark
+) -> tuple[float, float]:
+    """A_s of a mode: vertical and lateral share of the smeared fastenings in the implicit rail blocks [kg].
+
+    Args:
+        window: The rail.
+        fastening: Its fastenings.
+        spacing: Seat pitch d [m].
+        newmark: Step and coefficients.
+    """
+    per_mode = smearing(window, spacing) * window.length / (2.0 * spacing)
+    kv = per_mode * (newmark.beta_dt2 * fastening.vertical_stiffness + newmark.gamma_dt * fastening.vertical_damping)
+    kl = per_mode * (newmark.beta_dt2 * fastening.lateral_stiffness + newmark.gamma_dt * fastening.lateral_damping)
+    return kv, kl
 
 
 def rail_inverses(
@@ -34,9 +51,7 @@ def rail_inverses(
         newmark: Step and coefficients.
         V: Speed [m/s].
     """
-    n, per_mode = window.modes, smearing(window, spacing) * window.length / (2.0 * spacing)
-    kv = per_mode * (newmark.beta_dt2 * fastening.vertical_stiffness + newmark.gamma_dt * fastening.vertical_damping)
-    kl = per_mode * (newmark.beta_dt2 * fastening.lateral_stiffness + newmark.gamma_dt * fastening.lateral_damping)
+    n, (kv, kl) = window.modes, smeared_fastening(window, fastening, spacing, newmark)
     a, b = window.rail.arm_fastening, window.rail.half_base
     one, none = sp.eye_array(n), sp.csr_array((n, n))
     smeared_vertical = sp.block_diag([kv * one, none])

@@ -1,6 +1,6 @@
-"""The constant data of a group of trains that are advanced together.
+"""Constant data of a group of trains that are advanced together.
 
-All trains of a group run the same window along the same track at the same speed; they differ in their realisation
+All trains of a group move with the same window along the same track at the same speed; they differ in the realisation
 of the irregularity. Arrays have the shapes that the kernels of :mod:`tiengine.kernels.step` read.
 """
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tiengine.contact.table import ContactTable
 from tiengine.irregularity.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
-from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes, smearing
+from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes, smeared_fastening
 from tiengine.model.newmark import Newmark, inverse
 from tiengine.model.speed_blocks import Blocks
 from tiengine.track.fastening import Fastening, seat_count, seat_tables
@@ -25,7 +25,7 @@ from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail, RailWindow, sine_products
 from tiengine.track.slab import Slab
 from tiengine.track.slab_matrices import SlabMatrices
-from tiengine.vehicle.train import TrainModel, static_wheel_loads
+from tiengine.vehicle.train import TrainModel, centre_in_window, static_wheel_loads
 
 __all__ = ["Ingredients", "Model", "SlabDesigns", "build_model"]
 
@@ -49,7 +49,7 @@ class SlabDesigns:
 
 @dataclass(frozen=True)
 class Ingredients:
-    """What a model is made from.
+    """Ingredients of a model: track, train and numerics.
 
     Attributes:
         rail: Rail section, the same left and right.
@@ -65,11 +65,11 @@ class Ingredients:
         length: Window l [m].
         modes: N.
         newmark: Step and coefficients.
-        passes: Passes a step.
+        passes: Passes per step.
         cover: Enough slabs for every seat of the window, or the paper's count.
-        explicit_mortar: The bed in the explicit half.
-        local_compliance: Add the static compliance of the modes left out, under the wheels.
-        absorbing_zone: Length of the zones at the window's ends with more fastening, to the ground [m]; 0 for none.
+        explicit_mortar: Treat the bed explicitly.
+        local_compliance: Add the static compliance of the truncated modes under the wheels.
+        absorbing_zone: Length of the zones at the window's ends with additional springs to the ground [m]; 0 for none.
         trains: Trains advanced together.
     """
 
@@ -95,8 +95,36 @@ class Ingredients:
 
     @property
     def slots(self) -> int:
-        """Slabs in memory: the paper's Eq. (16), or one more, since a moving window can touch that many."""
-        return int(np.floor(self.length / self.slab.pitch)) + (2 if self.cover else 1)
+        """Slabs in memory."""
+        return self.slab.slots(self.length, self.cover)
+
+    @property
+    def seats(self) -> int:
+        """Most seats in the window at once."""
+        return seat_count(self.length, self.slab.fastening_pitch)
+
+    @property
+    def centre_s(self) -> float:
+        """Centre of the first vehicle in the window [m]."""
+        return centre_in_window(self.length, self.train.wheelset_x)
+
+    @property
+    def wheel_s(self) -> NDArray[np.float64]:
+        """Wheels in the window [m], shape (W,)."""
+        return self.centre_s + self.train.wheelset_x
+
+    @property
+    def dof_counts(self) -> dict[str, int]:
+        """Degrees of freedom of one train: vehicles (internal states apart), rails, slabs, all."""
+        vehicles, rails = self.train.n_dof, 2 * 5 * self.modes
+        slabs = self.slots * self.designs.matrices[0].n
+        return {
+            "vehicles": vehicles,
+            "rails": rails,
+            "slabs": slabs,
+            "total": vehicles + rails + slabs,
+            "internal_states": self.train.n - self.train.n_dof,
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,19 +132,18 @@ class Model:
     """Constant arrays of the step.
 
     Attributes:
-        given: What the model was made from.
+        ingredients: Track, train and numerics.
         window: Rail matrices.
-        wheel_s: Wheels in the window [m], shape (W,).
-        centre_s: Centre of the first vehicle in the window [m].
         dims: Sizes and offsets (``layout``).
         constants: Numbers (``layout``).
         stiffness: Elastic coefficients of the rails by mode, shape (N, 8).
         flow_sine, flow_cosine: G of the sine and cosine fields, transposed, shape (N, N).
         seat_table: cos and sin of k_i j d, shape (2N, seats).
         slab_seats: Slab coordinates to the seats: w left and right, dw/dy left and right, y; shape (dofs, 5 seats).
-        slab_linear: A slab's u, and its v, to its acceleration by its own stiffness and damping, shape
-            (2, designs, dofs, dofs).
-        slab_push: Forces of the seats (as ``slab_seats``) to the slab's acceleration, shape (designs, 5 seats, dofs).
+        slab_linear: Matrices from a slab's u, and from its v, to its acceleration by its own stiffness and damping,
+            shape (2, designs, dofs, dofs).
+        slab_push: Matrices from the forces of the seats (as ``slab_seats``) to the slab's acceleration, shape
+            (designs, 5 seats, dofs).
         slab_inverse: Inverses of the slab blocks, transposed, shape (designs, dofs, dofs).
         bed_index, bed_shape, bed_weight: Quadrature of the bed.
         bed_points: Slab coordinates to w at all quadrature points, shape (dofs, points).
@@ -129,10 +156,8 @@ class Model:
         blocks: Inverses that depend on the speed.
     """
 
-    given: Ingredients
+    ingredients: Ingredients
     window: RailWindow
-    wheel_s: NDArray[np.float64]
-    centre_s: float
     dims: NDArray[np.int32]
     constants: NDArray[np.float64]
     stiffness: NDArray[np.float64]
@@ -157,108 +182,90 @@ class Model:
     wheel_shape: NDArray[np.float64]
     blocks: Blocks
 
-    @property
-    def dof_counts(self) -> dict[str, int]:
-        """Degrees of freedom of one train: vehicles (internal states apart), rails, slabs, all."""
-        g = self.given
-        vehicles, rails = g.train.n_dof, 2 * 5 * g.modes
-        slabs = g.slots * int(self.dims[at.SLAB_DOFS])
-        return {
-            "vehicles": vehicles,
-            "rails": rails,
-            "slabs": slabs,
-            "total": vehicles + rails + slabs,
-            "internal_states": g.train.n - g.train.n_dof,
-        }
-
     def refactor(self, V: float) -> None:
         """Fill the blocks that depend on the speed V [m/s]."""
-        g = self.given
+        g = self.ingredients
         self.blocks.fill(self.window, g.fastening, g.slab.fastening_pitch, g.train, g.newmark, V, self.wheel_shape)
 
 
-def build_model(given: Ingredients, V: float) -> Model:
+def build_model(ingredients: Ingredients, V: float) -> Model:
     """Assemble and factorise everything for a speed V [m/s]."""
-    window = RailWindow(given.rail, given.length, given.modes)
-    train = given.train
-    middle = 0.5 * (train.wheelset_x.max() + train.wheelset_x.min())
-    centre_s = given.length / 2.0 - middle
-    wheel_s = centre_s + train.wheelset_x
-    first = given.designs.matrices[0]
-    sine, cosine = sine_products(given.modes)
+    window = RailWindow(ingredients.rail, ingredients.length, ingredients.modes)
+    train, wheel_s = ingredients.train, ingredients.wheel_s
+    first = ingredients.designs.matrices[0]
+    sine, cosine = sine_products(ingredients.modes)
     model = Model(
-        given=given,
+        ingredients=ingredients,
         window=window,
-        wheel_s=wheel_s,
-        centre_s=float(centre_s),
-        dims=_dims(given, first),
-        constants=_constants(given, window),
+        dims=_dims(ingredients, first),
+        constants=_constants(ingredients, window),
         stiffness=window.modal_stiffness,
         flow_sine=np.ascontiguousarray(sine.T),
         flow_cosine=np.ascontiguousarray(cosine.T),
-        seat_table=seat_tables(given.modes, given.length, given.slab.fastening_pitch),
-        **_slab_arrays(given),
+        seat_table=seat_tables(ingredients.modes, ingredients.length, ingredients.slab.fastening_pitch),
+        **_slab_arrays(ingredients),
         vehicle_load=np.stack([train.gravity, train.acceleration_force]),
         wheel=np.stack([train.wheel_radius, train.half_spacing, train.wheelset_spin_inertia], axis=1),
         wheel_shape=np.stack([window.shape(wheel_s), window.shape_slope(wheel_s)]),
-        blocks=Blocks.empty(given.modes, len(wheel_s), train.n),
+        blocks=Blocks.empty(ingredients.modes, len(wheel_s), train.n),
     )
     model.refactor(V)
     return model
 
 
-def _dims(given: Ingredients, first: SlabMatrices) -> NDArray[np.int32]:
+def _dims(ingredients: Ingredients, first: SlabMatrices) -> NDArray[np.int32]:
     """Sizes and offsets, see ``layout``."""
     dims = np.zeros(at.N_DIMS, dtype=np.int32)
-    n, B = given.modes, given.trains
-    explicit, no_tension = given.explicit_mortar, given.mortar.no_tension
-    dims[at.TRAINS], dims[at.MODES], dims[at.SLOTS], dims[at.SLAB_DOFS] = B, n, given.slots, first.n
-    dims[at.SEATS] = seat_count(given.length, given.slab.fastening_pitch)
-    dims[at.VEHICLE_DOFS], dims[at.WHEELSETS] = given.train.n, len(given.train.wheelset_x)
-    dims[at.SEATS_PER_SLAB] = given.slab.fastenings
+    n, B = ingredients.modes, ingredients.trains
+    explicit, no_tension = ingredients.explicit_mortar, ingredients.mortar.no_tension
+    dims[at.TRAINS], dims[at.MODES], dims[at.SLOTS], dims[at.SLAB_DOFS] = B, n, ingredients.slots, first.n
+    dims[at.SEATS] = ingredients.seats
+    dims[at.VEHICLE_DOFS], dims[at.WHEELSETS] = ingredients.train.n, len(ingredients.train.wheelset_x)
+    dims[at.SEATS_PER_SLAB] = ingredients.slab.fastenings
     dims[at.LATERAL] = B * 4 * n
     dims[at.SLABS] = B * 10 * n
-    dims[at.VEHICLES] = B * (10 * n + given.slots * first.n)
-    dims[at.BODIES] = len(given.train.body_names)
+    dims[at.VEHICLES] = B * (10 * n + ingredients.slots * first.n)
+    dims[at.BODIES] = len(ingredients.train.body_names)
     dims[at.MORTAR_MODE] = 2 if explicit else 1 if no_tension else 0
-    dims[at.CROSS_LEVEL_ROLLS] = int(given.cross_level_rolls)
+    dims[at.CROSS_LEVEL_ROLLS] = int(ingredients.cross_level_rolls)
     return dims
 
 
-def _constants(given: Ingredients, window: RailWindow) -> NDArray[np.float64]:
+def _constants(ingredients: Ingredients, window: RailWindow) -> NDArray[np.float64]:
     """Numbers, see ``layout``."""
     c = np.zeros(at.N_CONSTANTS)
-    newmark, fastening, rail, table = given.newmark, given.fastening, given.rail, given.contact
+    newmark, fastening, rail, table = ingredients.newmark, ingredients.fastening, ingredients.rail, ingredients.contact
     dt = newmark.dt
     c[at.DT], c[at.BETA_DT2], c[at.GAMMA_DT] = dt, newmark.beta_dt2, newmark.gamma_dt
     c[at.MASS], c[at.INERTIA_Y], _, c[at.INERTIA_Z], c[at.INERTIA_X] = rail.densities
-    c[at.LENGTH], c[at.SPACING] = given.length, given.slab.fastening_pitch
+    c[at.LENGTH], c[at.SPACING] = ingredients.length, ingredients.slab.fastening_pitch
     c[at.K_VERTICAL], c[at.C_VERTICAL] = fastening.vertical_stiffness, fastening.vertical_damping
     c[at.K_LATERAL], c[at.C_LATERAL] = fastening.lateral_stiffness, fastening.lateral_damping
     c[at.ARM_FASTENING], c[at.HALF_BASE], c[at.ARM_HEAD] = rail.arm_fastening, rail.half_base, rail.arm_head
-    c[at.FRICTION], c[at.CROWN_OFFSET] = given.friction, table.crown_offset
+    c[at.FRICTION], c[at.CROWN_OFFSET] = ingredients.friction, table.crown_offset
     c[at.IRREGULARITY_HALF_BASE], c[at.CONTACT_TOLERANCE] = HALF_BASE, CONTACT_TOLERANCE
-    c[at.STATIC_LOAD] = float(np.max(static_wheel_loads(given.train)))
-    c[at.SMEARING] = smearing(window, given.slab.fastening_pitch)
-    if given.local_compliance:
+    c[at.STATIC_LOAD] = float(np.max(static_wheel_loads(ingredients.train)))
+    smeared = smeared_fastening(window, fastening, ingredients.slab.fastening_pitch, newmark)
+    c[at.SMEARED_VERTICAL], c[at.SMEARED_LATERAL] = smeared
+    if ingredients.local_compliance:
         c[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1] = window.missing_compliance
-    c[at.ABSORBING_ZONE] = given.absorbing_zone
+    c[at.ABSORBING_ZONE] = ingredients.absorbing_zone
     c[at.TABLE_U0], c[at.TABLE_DU] = table.u_min, table.du
     c[at.TABLE_ALPHA0], c[at.TABLE_DALPHA] = table.alpha_min, table.dalpha
     return c
 
 
-def _slab_arrays(given: Ingredients) -> dict[str, Any]:
+def _slab_arrays(ingredients: Ingredients) -> dict[str, Any]:
     """Products, inverses and bed tables of every slab design."""
-    designs, mortar = given.designs.matrices, given.mortar
+    designs, mortar = ingredients.designs.matrices, ingredients.mortar
     first = designs[0]
     seats = seat_shapes(first)
     linear, push, inverses = [], [], []
-    for slab, scale in zip(designs, given.designs.seat_scale, strict=True):
-        K = slab.K_plate if given.explicit_mortar else slab.K_plate + slab.K_bed
-        C = np.zeros_like(K) if given.explicit_mortar else slab.C_bed
-        own_K, own_C = seat_inverse_terms(seats, scale, given.fastening, given.rail.half_base)
-        A = given.newmark.operator(sp.csr_array(slab.M), sp.csr_array(C + own_C), sp.csr_array(K + own_K))
+    for slab, scale in zip(designs, ingredients.designs.seat_scale, strict=True):
+        K = slab.K_plate if ingredients.explicit_mortar else slab.K_plate + slab.K_bed
+        C = np.zeros_like(K) if ingredients.explicit_mortar else slab.C_bed
+        own_K, own_C = seat_inverse_terms(seats, scale, ingredients.fastening, ingredients.rail.half_base)
+        A = ingredients.newmark.operator(sp.csr_array(slab.M), sp.csr_array(C + own_C), sp.csr_array(K + own_K))
         inverses.append(inverse(A, "slab").T)
         linear.append(-np.stack([K.T, C.T]) @ inverses[-1])
         push.append(seats.T @ inverses[-1])
@@ -276,7 +283,7 @@ def _slab_arrays(given: Ingredients) -> dict[str, Any]:
         "bed_lateral_K": np.stack([slab.K_bed[-2:, -2:] for slab in designs]),
         "bed_lateral_C": np.stack([slab.C_bed[-2:, -2:] for slab in designs]),
         "bed_numbers": np.array(
-            [mortar.stiffness, mortar.damping, float(given.explicit_mortar), float(mortar.no_tension)]
+            [mortar.stiffness, mortar.damping, float(ingredients.explicit_mortar), float(mortar.no_tension)]
         ),
     }
 

@@ -1,4 +1,4 @@
-r"""The implicit half: Newmark's average acceleration on constant blocks, factorised once.
+r"""Implicit part of the step: Newmark's average acceleration on constant blocks, factorised once.
 
 The semi-discrete equations M a + C v + K u = f(u, v, t) are advanced with (Newmark 1959; predictor form of Hughes and
 Liu 1978)
@@ -8,14 +8,14 @@ Liu 1978)
     A a^{k+1} = -(C v~ + K u~) + f(u^k, v^k, t_{n+1}) + A_s a^k,   A = M + gamma dt C + beta dt^2 K + A_s
 
 k = 0, 1, ... passes from a^0 = 0. Everything that moves or is nonlinear is in f, evaluated by the kernels at the
-iterate. A_s = beta dt^2 K_s + gamma dt C_s is a constant stand-in for the part of f that would make the iteration
-diverge: fastenings smeared along the rail. It drops out as the passes converge. With beta = 1/4, gamma = 1/2 the
-method is of second order; two passes keep that order, because the first leaves an error of order dt^2 in a.
+iterate. A_s = beta dt^2 K_s + gamma dt C_s is a constant approximation of the part of f that would make the iteration
+diverge: fastenings smeared along the rail. It cancels as the passes converge. With beta = 1/4, gamma = 1/2 the
+method is of second order; two passes keep that order, because the error of a after the first is of order dt^2.
 
-A_s leaves out the smeared fastenings' convective part -V c d/ds, a few per cent of the rest: being no more than a
-stand-in, it changes how fast the passes converge, not what to. The slabs' blocks hold their seats exactly, also those
-that stand outside the window at the moment and exert no force: there the block carries some kilograms too much
-(gamma dt c + beta dt^2 k a seat, of order dt), on slabs that the wheels do not reach.
+A_s omits the convective part -V c d/ds of the smeared fastenings, a few per cent of A_s: being an approximation, it
+changes the rate of convergence of the passes, not their limit. The slabs' blocks contain their seats exactly, also
+those outside the window that exert no force at the moment: there the block has some kilograms too much
+(gamma dt c + beta dt^2 k per seat, of order dt), on slabs that the wheels do not reach.
 
 | symbol | meaning |
 |---|---|

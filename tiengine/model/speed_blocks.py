@@ -19,17 +19,18 @@ __all__ = ["Blocks"]
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """What depends on the speed; refilled in place when it has changed by a set amount.
+    """Matrices that depend on the speed; filled again in place when it has changed by a set amount.
 
     Attributes:
         vertical: Inverse of the rail's vertical block, shape (2N, 2N), transposed for right multiplication.
         lateral: Inverse of the rail's lateral block, shape (3N, 3N), transposed.
         vehicle: Inverse of the train's block, shape (n, n), transposed.
-        vehicle_linear: The train's u, and its v, to its acceleration by its own stiffness and damping, shape (2, n, n).
+        vehicle_linear: Matrices from the train's u, and from its v, to its acceleration by its own stiffness and
+            damping, shape (2, n, n).
         rail_answer: Rows of A^-1 of the rail's value and slope under the wheels: of w (2N), v (3N), theta_x (3N), shape
             (W, 2, 8N).
         vehicle_answer: Rows of A^-1 of y, z, roll, pitch, yaw of the wheelsets, shape (5W, n).
-        wheelset_compliance: The same at the wheelsets themselves, shape (W, 5, 5).
+        wheelset_compliance: Their entries at the same wheelset, shape (W, 5, 5).
         rail_coupling: a and its slope a' under a wheel by forces under another of the same rail, in w, v, theta_x,
             shape (W, 2, W, 3, 3).
     """
@@ -45,7 +46,7 @@ class Blocks:
 
     @classmethod
     def empty(cls, modes: int, wheelsets: int, vehicle: int) -> Blocks:
-        """Arrays to be filled."""
+        """Zeros, for :meth:`fill`."""
         n, w = modes, wheelsets
         return cls(
             vertical=np.zeros((2 * n, 2 * n)),

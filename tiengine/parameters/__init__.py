@@ -1,1 +1,1 @@
-"""Parameters: units and ranges declared once, errors of one line, files that a user names, presets."""
+"""Parameters: units and ranges declared once, one-line errors, user files, presets, conventions."""

@@ -1,7 +1,7 @@
-"""Files that a user names: regular files of bounded size, read whole and never executed. All limits stand here.
+"""User files: regular files of bounded size, read whole and never executed. All limits are declared here.
 
-A path may be absolute, lead out of the scenario's folder or through a symbolic link: such files are only read. What is
-no regular file (a folder, a device such as /dev/zero, a pipe) is refused before it is opened, since reading it may
+A path may be absolute, lead out of the scenario's folder or through a symbolic link: such files are only read. Anything
+but a regular file (a folder, a device such as /dev/zero, a pipe) is refused before it is opened, since reading it may
 never end.
 """
 
@@ -42,16 +42,16 @@ __all__ = [
 
 LARGEST_TOML = 5_000_000  # bytes: tomllib reads 1 MB a second; a scenario with its profiles has 0.1 MB
 LARGEST_PROFILE = 10_000_000  # bytes
-LARGEST_TRACK = 100_000_000  # bytes: some 400 km at 0.25 m
-LARGEST_CHECKPOINT = 2**30  # bytes; one of 64 trains has some 50 MB
+LARGEST_TRACK = 100_000_000  # bytes: about 400 km at 0.25 m
+LARGEST_CHECKPOINT = 2**30  # bytes; one of 64 trains has about 50 MB
 LONGEST_LINE = 10_000  # characters of a profile or a track
 LARGEST_NUMBER, SMALLEST_NUMBER = 1e15, 1e-15
 """Magnitudes of any number of a scenario but zero: products of several of them stay within double precision."""
 
 OVERFLOWING = 1e300
 
-DEEPEST = 20  # tables and lists in each other
-LONGEST_KEY = 1000  # characters: presets are kept under their paths
+DEEPEST = 20  # levels of nested tables and lists
+LONGEST_KEY = 1000  # characters: presets are stored under their paths
 WHOLE = 2**63  # TOML's whole numbers have 64 bits
 LONG_KEY = re.compile(
     rf"""(?<![\w-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{DEEPEST}}}""", flags=re.ASCII
@@ -61,7 +61,7 @@ UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
 
 
 def check_regular(path: str | Path, where: str, largest: int) -> None:
-    """Refuse what is no regular file, or too large.
+    """Refuse anything but a regular file of bounded size.
 
     Args:
         path: The file; links are followed.
@@ -98,7 +98,7 @@ def read_bytes(path: str | Path, where: str, largest: int) -> bytes:
     check_regular(path, where, largest)
     try:
         with open(path, "rb") as file:
-            data = file.read(largest + 1)  # it may have grown
+            data = file.read(largest + 1)  # the file may have grown since
     except OSError as error:
         raise InputError(f"{where}: cannot be read ({error.strerror or error})") from None
     if len(data) > largest:
@@ -107,7 +107,7 @@ def read_bytes(path: str | Path, where: str, largest: int) -> bytes:
 
 
 def read_text_file(path: str | Path, where: str, largest: int) -> str:
-    """A text of bounded size; what is not UTF-8 is read as Latin-1, which only comments may need.
+    """Read a text file of bounded size; a text that is not UTF-8 is read as Latin-1.
 
     Args:
         path: The file.
@@ -115,7 +115,7 @@ def read_text_file(path: str | Path, where: str, largest: int) -> str:
         largest: Greatest size [bytes].
 
     Raises:
-        InputError: The file cannot be read, is too large, is no text, or has a line no such file has.
+        InputError: The file cannot be read, is too large, is no text, or has an overlong line.
     """
     data = read_bytes(path, where, largest)
     if b"\0" in data:
@@ -134,8 +134,8 @@ def numbers_of(fields: Sequence[str]) -> list[float] | None:
     """The fields as numbers, None if one is not.
 
     Args:
-        fields: Texts. ``1_000`` and foreign digits, which Python's own ``float`` takes, are none; what a change of
-            units might take beyond double precision is infinite.
+        fields: Texts. ``1_000`` and non-ASCII digits, which Python's ``float`` accepts, are not numbers; a magnitude
+            that a change of units might take beyond double precision becomes infinite.
     """
     if any("_" in field or not field.isascii() for field in fields):
         return None
@@ -153,7 +153,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         where: Its name for messages.
 
     Raises:
-        InputError: It is not TOML, nested too deep, or holds what no scenario does.
+        InputError: It is not TOML, nested too deep, or holds a value no scenario has.
     """
     try:
         tables = plain_toml(text, where)
@@ -189,12 +189,12 @@ def plain_toml(text: str, where: str) -> dict[str, Any]:
 
 
 def to_tuples(value: Any, where: str = "", depth: int = 0) -> Any:
-    """The value with every list in it, at any depth, turned into a tuple, and free of what no scenario holds.
+    """Turn every list into a tuple, at any depth, and refuse values that no scenario holds.
 
     Args:
         value: A number, a text, a truth value, a list or a table of such.
         where: Its key for messages.
-        depth: Tables and lists around it.
+        depth: Number of enclosing tables and lists.
 
     Raises:
         InputError: A number that is not finite or out of all bounds, a text with control characters, a date, or tables
@@ -229,15 +229,15 @@ def to_tuples(value: Any, where: str = "", depth: int = 0) -> Any:
 
 
 def user_path(text: str, folder: Path | None, called: str) -> Path:
-    """A path that a user wrote.
+    """Path of a user file.
 
     Args:
         text: Absolute, or relative to ``folder``; ``~`` is the home folder.
         folder: The folder of the scenario file; the working directory if None.
-        called: What the message calls it.
+        called: Its name for messages.
 
     Raises:
-        InputError: ``~`` stands for nobody.
+        InputError: ``~`` has no home folder.
     """
     try:
         return (folder or Path()) / Path(text).expanduser()
@@ -246,10 +246,10 @@ def user_path(text: str, folder: Path | None, called: str) -> Path:
 
 
 def is_file(path: Path) -> bool:
-    """Whether a regular file is there; no for names that no file can have.
+    """Whether a regular file exists; False for names that no file can have.
 
     Args:
-        path: What was asked for.
+        path: The path.
     """
     try:
         return path.is_file()

@@ -1,6 +1,6 @@
-"""Finding presets of the library, by name or by path, and reading TOML.
+"""Presets of the library and of the user, found by name or by path.
 
-Every kind of part has a folder ``tiengine/library/<kind>/`` with one file a preset. A preset is asked for by
+Every kind of part has a folder ``tiengine/library/<kind>/`` with one file per preset. A preset is referred to by
 its bare name (``"CHN60"``) or by the path of a file of the same form (``"my_rail.toml"``).
 """
 
@@ -65,7 +65,7 @@ def find_preset(kind: str, name_or_path: str, suffix: str = "", folder: Path | N
         name_or_path: ``"CHN60"``, or a path, absolute or relative to ``folder``.
         suffix: Suffix of the library's files; the kind's own (``.toml``, profiles ``.csv``) if empty.
         folder: Where relative paths start (the folder of the scenario file); the working directory if None.
-        called: What the messages call the thing (the scenario's key); the kind if empty.
+        called: Its name for messages (the scenario's key); the kind if empty.
 
     Returns:
         Path of an existing file.
@@ -96,7 +96,7 @@ def _is_path(text: str, suffix: str) -> bool:
 
 
 def preset_source(kind: str, name: str) -> str:
-    """Where the numbers of a preset come from, in one line.
+    """Source of a preset's numbers, in one line.
 
     Args:
         kind: One of :data:`KINDS`.
@@ -112,4 +112,4 @@ def preset_source(kind: str, name: str) -> str:
             return " ".join(source.split())
     lines = read_text(path).splitlines()
     head = [line.lstrip("# ") for line in takewhile(lambda line: line.startswith("#"), lines)]
-    return " ".join(head[:-1])  # the last one names the columns
+    return " ".join(head[:-1])  # the last line names the columns

@@ -1,23 +1,22 @@
-"""Units and ranges of parameters, declared once beside the field.
+"""Units and ranges of parameters, declared once, with the field.
 
 A parameter class derives from :class:`Params` and annotates its fields with :func:`Q`::
 
     class Rail(Params):
         EI: Annotated[float, Q("N m^2", gt=0)]
 
-The same declaration validates, feeds the HDF5 attributes and the manual. Everything is SI inside.
+The same declaration is used for validation, HDF5 attributes and the manual. All values are SI.
 """
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from tiengine.parameters.errors import InputError
+from tiengine.parameters.errors import InputError, nearest
 
 __all__ = ["Name", "Params", "PlainName", "Q", "Source", "build", "explain"]
 
@@ -41,7 +40,7 @@ def Q(unit: str, description: str = "", **rule: Any) -> Any:
 
     Args:
         unit: SI unit as text, ``"-"`` for none.
-        description: What the number is.
+        description: Meaning of the number.
         rule: pydantic bounds: ``gt``, ``ge``, ``lt``, ``le``.
 
     Returns:
@@ -51,19 +50,20 @@ def Q(unit: str, description: str = "", **rule: Any) -> Any:
 
 
 def _check_plain(name: str) -> str:
+    """Refuse slashes and control characters."""
     if any(mark in name for mark in "/\\\n\t\r"):
-        raise ValueError("must be one line without slashes, as files are called after it")
+        raise ValueError("must be one line without slashes, since files are named after it")
     return name
 
 
-Name = Annotated[str, Field(description="what it is called", max_length=200)]
+Name = Annotated[str, Field(description="name", max_length=200)]
 PlainName = Annotated[
     str,
-    Field(description="what it is called, and its result file by default", min_length=1, max_length=200),
+    Field(description="name, also of its result file by default", min_length=1, max_length=200),
     AfterValidator(_check_plain),
 ]
-"""A name from which that of a file is made; it leads to no other folder."""
-Source = Annotated[str, Field(description="where its numbers come from")]
+"""A name that also names a file; it cannot point to another folder."""
+Source = Annotated[str, Field(description="source of the numbers")]
 
 
 class Params(BaseModel):
@@ -75,7 +75,7 @@ class Params(BaseModel):
 
 
 def build(model: type[M], table: Mapping[str, Any], where: str = "") -> M:
-    """Make validated parameters from a table, with the house's one-line errors.
+    """Make validated parameters from a table, with one-line errors.
 
     Args:
         model: A class derived from :class:`Params`.
@@ -86,7 +86,7 @@ def build(model: type[M], table: Mapping[str, Any], where: str = "") -> M:
         The parameters.
 
     Raises:
-        InputError: The first thing that breaks a rule.
+        InputError: The first value that breaks a rule.
     """
     try:
         return model.model_validate(dict(table))
@@ -95,11 +95,11 @@ def build(model: type[M], table: Mapping[str, Any], where: str = "") -> M:
 
 
 def explain(error: ValidationError, model: type[BaseModel], where: str = "") -> str:
-    """One line for the first thing pydantic found wrong.
+    """One-line message for the first error that pydantic found.
 
     Args:
-        error: What pydantic raised.
-        model: The class that was being made, for the nearest known key.
+        error: Exception raised by pydantic.
+        model: Class being built, for the nearest known key.
         where: Prefix that names the object (file or table).
 
     Returns:
@@ -113,7 +113,7 @@ def explain(error: ValidationError, model: type[BaseModel], where: str = "") -> 
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
     prefix = f"{where}.{key}" if where and key else where or key
     if first["type"] == "extra_forbidden":
-        return f"{prefix}: unknown key{_nearest(str(path[-1]), _known(model, path[:-1]))}"
+        return f"{prefix}: unknown key{nearest(str(path[-1]), _known(model, path[:-1]))}"
     if first["type"] == "missing":
         return f"{prefix}: missing; a value is required"
     # A union reports every alternative it tried; they share the path of the field.
@@ -124,7 +124,7 @@ def explain(error: ValidationError, model: type[BaseModel], where: str = "") -> 
 
 
 def _rule(message: str) -> str:
-    """Pydantic's sentence in the house's words."""
+    """Pydantic's message in the wording of this package."""
     message = re.sub(r"^\w+ should have (.*) after validation, not \d+", r"must have \1", message)
     for old, new in _WORDS.items():
         message = message.replace(old, new)
@@ -132,6 +132,7 @@ def _rule(message: str) -> str:
 
 
 def _is_bound(kind: str) -> bool:
+    """Whether an error of this kind is a violated bound, which has a unit."""
     return kind.startswith(("greater_than", "less_than"))
 
 
@@ -142,7 +143,7 @@ def _short(value: Any) -> str:
 
 
 def _trace(model: Any, path: tuple[int | str, ...]) -> tuple[tuple[int | str, ...], str]:
-    """The path without the tags pydantic adds for members of a union, and the unit declared at its end."""
+    """The path without the tags pydantic adds for union members, and the unit declared for its last field."""
     kept: list[int | str] = []
     unit = ""
     for depth, part in enumerate(path, start=1):
@@ -176,8 +177,3 @@ def _classes(annotation: Any) -> list[type]:
     if isinstance(annotation, type) and not getattr(annotation, "__args__", ()):
         return [annotation]
     return [found for part in getattr(annotation, "__args__", ()) for found in _classes(part)]
-
-
-def _nearest(key: str, known: list[str]) -> str:
-    close = difflib.get_close_matches(key, known, n=1) or [name for name in known if name.startswith(key)]
-    return f"; did you mean {close[0]!r}?" if close else f"; known: {', '.join(known)}" if known else ""

@@ -1,1 +1,1 @@
-"""Profiling: where the time of a step goes, held against the machine."""
+"""Profiling: time of each stage of the step, compared with the roofline of the machine."""

@@ -1,4 +1,4 @@
-"""What a measurement was made with: versions, processor, caches, memory.
+"""Circumstances of a measurement: versions, processor, caches, memory.
 
 Processor and caches are read from Linux's own files. The libraries for it start a child process, which hangs when it is
 forked after Taichi has begun; on other systems the caches stay unknown.
@@ -70,16 +70,17 @@ def versions() -> dict[str, str]:
 
 def import_seconds() -> float:
     """Wall time of importing what a run needs, in a fresh interpreter [s]; call it before Taichi begins."""
-    script = "import time; clock = time.perf_counter(); import tiengine.simulation.simulate; print(time.perf_counter() - clock)"
+    load = "import tiengine.simulation.simulate"
+    script = f"import time; clock = time.perf_counter(); {load}; print(time.perf_counter() - clock)"
     output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
     return float(output.split()[-1])
 
 
 def cache_bytes(folder: Path) -> dict[int, int]:
-    """Sizes of data and unified caches by level; empty where the system does not say.
+    """Sizes of data and unified caches by level; empty where the system does not describe them.
 
     Args:
-        folder: Where Linux describes the caches of a core.
+        folder: Folder in which Linux describes the caches of a core.
     """
     found = {}
     for each in sorted(folder.glob("index*")):
@@ -98,7 +99,7 @@ def _cpu() -> str:
 
 
 def _blas() -> str:
-    """NumPy's BLAS, the one that solves."""
+    """Name and version of NumPy's BLAS, which does the products of the step."""
     libraries = [each for each in threadpool_info() if each["user_api"] == "blas"]
     own = [each for each in libraries if "numpy" in each["filepath"]] or libraries
     return f"{own[0]['internal_api']} {own[0]['version']} ({own[0].get('architecture', '?')})" if own else "unknown"

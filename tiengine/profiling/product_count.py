@@ -1,7 +1,7 @@
-"""Operations and bytes of the step's matrix products, counted from the arrays that they are given.
+"""Operations and bytes of the step's matrix products, counted from their operands.
 
-One step runs with NumPy's products replaced by ones that count, so that the count follows whatever the step does.
-Products written with ``@`` (a damaged slab's) are not seen.
+One step runs with NumPy's products replaced by counting ones, so that the count follows the step itself. Products
+written with ``@`` (those of a damaged slab) are not counted.
 """
 
 from __future__ import annotations
@@ -13,9 +13,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
-from tiengine.model.model import Model
+from tiengine.engine.stepper import Rows, Stepper
 
 __all__ = ["Work", "count_products", "work_of"]
 
@@ -25,9 +23,9 @@ class Work:
     """Matrix products.
 
     Attributes:
-        products: How many.
+        products: Number of products.
         flops: Multiplications and additions.
-        traffic: Bytes of operands and results, each touched once a product.
+        traffic: Bytes of operands and results, each touched once per product.
         read: Bytes of the operands alone.
     """
 
@@ -37,7 +35,7 @@ class Work:
     read: int = 0
 
     def __add__(self, other: Work) -> Work:
-        """Both."""
+        """Sum of both."""
         return Work(
             self.products + other.products,
             self.flops + other.flops,
@@ -52,39 +50,33 @@ def work_of(a: Any, b: Any, result: Any) -> Work:
     return Work(1, 2 * np.size(result) * a.shape[-1], read + np.asarray(result).nbytes, read)
 
 
-def count_products(model: Model, state: State, chunk: Chunk, load: Callable[[Stepper], object]) -> dict[str, Work]:
-    """Take one step and count its products, stage by stage.
+def count_products(stepper: Stepper) -> dict[str, Work]:
+    """Take the last step once more, without watchers, and count its products stage by stage.
 
     Args:
-        model: Constant data.
-        state: Advanced by one step.
-        chunk: Buffers.
-        load: Loads the coming step.
+        stepper: A loaded stepper.
 
     Returns:
-        Work by name of the stage, in ``Stepper.stages``; stages without products left out.
+        Work by name of the stage; stages without products left out.
     """
     work: dict[str, Work] = {}
-    where = [""]
+    found: list[Work] = []
 
     def counting(product: Callable[..., Any]) -> Callable[..., Any]:
-        def counted(a: Any, b: Any, *rest: Any, **options: Any) -> Any:
-            result = product(a, b, *rest, **options)
-            work[where[0]] = work.get(where[0], Work()) + work_of(a, b, result)
+        def counted(a: Any, b: Any, *others: Any, **options: Any) -> Any:
+            result = product(a, b, *others, **options)
+            found.append(work_of(a, b, result))
             return result
 
         return counted
 
-    def named(name: str, call: Callable[[], object]) -> Callable[[], object]:
-        def stage() -> None:
-            where[0] = name
-            call()
-
-        return stage
-
     with patch.object(np, "matmul", counting(np.matmul)), patch.object(np, "dot", counting(np.dot)):
-        stepper = Stepper(model, state, chunk)  # anew: a stepper may hold on to the products it was made with
-        stepper.stages = tuple((name, named(name, call)) for name, call in stepper.stages)
-        load(stepper)
-        stepper.step(0)
-    return {name: each for name, each in work.items() if name}
+        stepper.bind()  # stages keep the products that they were made with
+        stepper.rows = Rows(max(stepper.rows.step, 0))
+        for name, call in stepper.stages:
+            found.clear()
+            call()
+            if found:
+                work[name] = sum(found, work.get(name, Work()))
+    stepper.bind()
+    return work

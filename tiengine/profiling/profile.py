@@ -1,14 +1,14 @@
-"""Where the time of a scenario goes: the run's own loop with timers around the stages of the step.
+"""Profile of a scenario: the run's own loop with timers between the stages of the step.
 
-Means add up: the stages of a step, what is done once a chunk, and the rest (the loop itself) are the loop. The
-real-time factor is that of the blocks of steps without timers.
+Means add up: the stages of a step, the work that is done once a chunk, and the remainder (the loop itself) are the
+loop. The real-time factor is that of the blocks of steps without timers.
 """
 
 from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,14 +17,15 @@ import numpy as np
 from taichi.lang import impl
 from threadpoolctl import threadpool_limits
 
-from tiengine.kernels import layout as at
+from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.stepper import BETWEEN_STEPS
 from tiengine.parameters.errors import InputError
 from tiengine.profiling.machine import import_seconds, this_machine, versions
 from tiengine.profiling.product_count import Work, count_products
 from tiengine.profiling.report import Loop, Memory, ProfileReport, Rate, Stage, Wall
 from tiengine.profiling.roofline import Roofs, measure_roofs
 from tiengine.profiling.stage_estimates import contact_us, suspension_us
-from tiengine.profiling.timed_loop import REST, StageTimers, TimedLoop, Times, shown
+from tiengine.profiling.timed_loop import Times, displayed_name, measure
 from tiengine.recording.trackside import trackside_groups
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
@@ -37,12 +38,12 @@ __all__ = ["array_bytes", "profile"]
 WARM_UP_STEPS = 300
 
 HOME = {"suspension": "fastening kernel", "contact": "fastening kernel"}
-"""Parts without a stage of their own, and the stage from whose time their estimate is taken off."""
+"""Parts without a stage of their own, and the stage from whose time their estimate is subtracted."""
 
 ORDER = ("window and seats", "irregularity", "predictors and correctors", "linear forces", "motion at the seats",
          "fastening kernel", "suspension", "contact", "mortar", "implicit solve", "recording", "envelopes",
          "gauges", "deflection", "checks", "writing")  # fmt: skip
-"""Rows of the table; stages unknown here come after."""
+"""Rows of the table; other stages come after."""
 
 
 def profile(
@@ -55,42 +56,41 @@ def profile(
     """Measure where the time of a scenario's loop goes.
 
     Args:
-        scenario: What to run, as for :func:`tiengine.run`.
-        trains: Trains advanced together, with seeds that follow each other; by default
-            those that a run of the scenario would advance together.
+        scenario: Scenario, as for :func:`tiengine.run`.
+        trains: Trains advanced together, with consecutive seeds; by default those that a run of the scenario would
+            advance together.
         seconds: Simulated time [s].
-        steps: Steps to measure instead, at least 2.
+        steps: Number of steps to measure instead, at least 2.
 
     Returns:
         The report.
 
     Raises:
-        InputError: The scenario breaks a rule, or its way is too short.
+        InputError: The scenario breaks a rule, or its distance is too short.
         RunFailedError: The train derailed or the numbers ran away.
     """
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     _check(trains, seconds, steps)
     importing = import_seconds()
     with threadpool_limits(1), ExitStack() as stack:
-        loop, wall = _set_up(
-            _task(scenario, trains), importing, Path(stack.enter_context(TemporaryDirectory(prefix="tiengine-")))
-        )
-        stack.callback(loop.writer.leave)
-        return _measure(loop, wall, max(2, round(seconds / loop.recorder.dt)) if steps is None else steps)
+        folder = Path(stack.enter_context(TemporaryDirectory(prefix="tiengine-")))
+        run, writer, wall = _set_up(_task(scenario, trains), importing, folder)
+        stack.callback(writer.leave)
+        return _profile(run, writer, wall, max(2, round(seconds / run.recorder.dt)) if steps is None else steps)
 
 
 def _check(trains: int | None, seconds: float, steps: int | None) -> None:
-    """Refuse what cannot be measured."""
+    """Refuse settings that cannot be measured."""
     if trains is not None and trains < 1:
         raise InputError(f"trains = {trains}: must be at least 1")
     if not 0.0 < seconds < np.inf:
         raise InputError(f"seconds = {seconds:g}: must be greater than 0")
     if steps is not None and steps < 2:
-        raise InputError(f"steps = {steps}: must be at least 2, with timers and without")
+        raise InputError(f"steps = {steps}: must be at least 2, one with timers and one without")
 
 
 def _task(scenario: Scenario, trains: int | None) -> Task:
-    """The trains to advance together: the first that a run would, or so many like the first with seeds that follow."""
+    """Trains to advance together: the first task of a run, or copies of its first train with consecutive seeds."""
     task = plan(scenario)[0]
     if trains is None:
         return task
@@ -99,45 +99,43 @@ def _task(scenario: Scenario, trains: int | None) -> Task:
     return Task(0, task.scenario, tuple(range(trains)), tracks)
 
 
-def _set_up(task: Task, importing: float, folder: Path) -> tuple[TimedLoop, Wall]:
-    """Everything before the loop, as a run does it."""
+def _set_up(task: Task, importing: float, folder: Path) -> tuple[Run, Writer, Wall]:
+    """Do everything before the loop, as a run does."""
     started = time.perf_counter()
     scenario, run = task.scenario, Run.begin(task)
-    model, recorder, stepper = run.model, run.recorder, run.stepper
-    groups = recorder.groups() | trackside_groups(scenario)
+    groups = run.recorder.groups() | trackside_groups(scenario)
     precision = scenario.output.precision
     writer = Writer(folder / "profile.h5", to_toml(scenario), {}, [run.labels] * task.size, groups, precision)
-    first = scenario.rear + model.centre_s
-    end = first + scenario.train.distance
-    timers = StageTimers(stepper)
-    loop = TimedLoop(scenario, stepper, timers, recorder, run.trackside, run.guard, writer, run.tracks, first, end)
     generation = float(impl.get_runtime().prog.get_total_compilation_time())
     setup = time.perf_counter() - started - run.jit
-    return loop, Wall(import_s=importing, jit_s=run.jit, code_generation_s=generation, setup_s=setup)
+    return run, writer, Wall(import_s=importing, jit_s=run.jit, code_generation_s=generation, setup_s=setup)
 
 
-def _measure(loop: TimedLoop, wall: Wall, steps: int) -> ProfileReport:
+def _profile(run: Run, writer: Writer, wall: Wall, steps: int) -> ProfileReport:
     """Warm up, measure, estimate, count."""
     warm_up = min(WARM_UP_STEPS, max(2, steps))
-    loop.advance(warm_up)
-    times = loop.advance(steps)
-    model, state, chunk = loop.stepper.model, loop.stepper.state, loop.stepper.chunk
-    memory = Memory(peak_memory(), *(array_bytes(each) * 1e-6 for each in (model, state, chunk)))
-    parts = _parts(loop)
-    work = count_products(model, state, chunk, lambda stepper: replace(loop, stepper=stepper).load(1))
+    measure(run, writer, warm_up)
+    times = measure(run, writer, steps)
+    stepper, ingredients = run.stepper, run.stepper.ingredients
+    assert isinstance(stepper, SineStepper)  # estimates and counts know its launches and products
+    memory = Memory(
+        peak_memory(), *(array_bytes(each) * 1e-6 for each in (stepper.model, stepper.state, stepper.chunk))
+    )
+    parts = _parts(stepper)
+    work = count_products(stepper)
     machine = this_machine()
     roofs = measure_roofs(machine.l2_bytes, machine.l3_bytes)
-    trains, dt = int(model.dims[at.TRAINS]), loop.recorder.dt
+    trains, dt = stepper.state.trains, run.recorder.dt
     per_chunk = sum(times.chunks.values()) / steps
     factor = (times.plain_ns / times.plain_steps + per_chunk) * 1e-9 / dt
     loop_us = (times.timed_ns / times.timed_steps + per_chunk) * 1e-3 / trains
     p50, p90, p99 = np.percentile(times.timed, (50, 90, 99)) * 1e-3
     return ProfileReport(
-        scenario=loop.scenario.name,
+        scenario=run.task.scenario.name,
         trains=trains,
         time_step_s=dt,
-        passes=model.given.passes,
-        dofs=model.dof_counts["total"],
+        passes=ingredients.passes,
+        dofs=ingredients.dof_counts["total"],
         warm_up_steps=warm_up,
         steps=steps,
         versions=versions(),
@@ -161,13 +159,12 @@ def _measure(loop: TimedLoop, wall: Wall, steps: int) -> ProfileReport:
     )
 
 
-def _parts(loop: TimedLoop) -> dict[str, tuple[float, float]]:
-    """Calls a step and time [us a train-step] of parts that share a stage with others."""
-    model, state = loop.stepper.model, loop.stepper.state
-    passes = model.given.passes
+def _parts(stepper: SineStepper) -> dict[str, tuple[float, float]]:
+    """Calls per step and time [us per train-step] of parts that share a stage with others."""
+    passes = stepper.ingredients.passes
     return {
-        "suspension": (passes, passes * suspension_us(model, state)),
-        "contact": (passes, passes * contact_us(loop.stepper)),
+        "suspension": (passes, passes * suspension_us(stepper)),
+        "contact": (passes, passes * contact_us(stepper)),
     }
 
 
@@ -186,9 +183,9 @@ def _stages(times: Times, parts: dict[str, tuple[float, float]], trains: int, lo
             us[part], calls[part] = time_us, count
             us[HOME[part]] -= time_us
             estimated |= {part, HOME[part]}
-    us[REST] = 0.0
-    us[REST] = loop_us - sum(us.values())
-    names = sorted(us, key=lambda name: (name == REST, ORDER.index(name) if name in ORDER else len(ORDER)))
+    us[BETWEEN_STEPS] = 0.0
+    us[BETWEEN_STEPS] = loop_us - sum(us.values())
+    names = sorted(us, key=lambda name: (name == BETWEEN_STEPS, ORDER.index(name) if name in ORDER else len(ORDER)))
     return tuple(
         Stage(name, float(calls.get(name, 1.0)), us[name], us[name] / loop_us, name in estimated) for name in names
     )
@@ -198,7 +195,7 @@ def _rates(times: Times, work: dict[str, Work], roofs: Roofs) -> tuple[Rate, ...
     """Matrix products of each stage over the time that the stage took."""
     stages: dict[str, Work] = {}
     for name, each in work.items():
-        stages[shown(name)] = stages.get(shown(name), Work()) + each
+        stages[displayed_name(name)] = stages.get(displayed_name(name), Work()) + each
     seconds = {name: times.stages[name] * 1e-9 / times.timed_steps for name in stages}
     return tuple(
         Rate(
@@ -218,19 +215,19 @@ def array_bytes(data: Any) -> int:
     """Bytes of the NumPy arrays that an object of dataclasses, mappings and sequences holds, each counted once."""
     seen: dict[int, int] = {}
 
-    def look(value: Any) -> None:
+    def visit(value: Any) -> None:
         if isinstance(value, np.ndarray):
             owner = value if value.base is None or not isinstance(value.base, np.ndarray) else value.base
             seen[id(owner)] = owner.nbytes
         elif is_dataclass(value):
             for each in fields(value):
-                look(getattr(value, each.name))
+                visit(getattr(value, each.name))
         elif isinstance(value, dict):
             for each in value.values():
-                look(each)
+                visit(each)
         elif isinstance(value, (tuple, list)):
             for each in value:
-                look(each)
+                visit(each)
 
-    look(data)
+    visit(data)
     return sum(seen.values())

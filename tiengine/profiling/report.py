@@ -1,4 +1,4 @@
-"""What a profile found: values with their units in their names, as JSON and back, and two of them compared."""
+"""Report of a profile: values with their units in their names, JSON, and the comparison of two reports."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Wall:
 
     Attributes:
         import_s: Importing the engine and its packages.
-        jit_s: Making the step's kernels ready, from source or from Taichi's cache.
-        code_generation_s: The part of it that generated code; near zero when all came from the cache.
-        setup_s: Model and start, JIT apart.
+        jit_s: Compiling the step's kernels, or loading them from Taichi's cache.
+        code_generation_s: Code generation, a part of it; near zero when all kernels are in the cache.
+        setup_s: Model and start, without compiling.
     """
 
     import_s: float
@@ -43,10 +43,10 @@ class Stage:
 
     Attributes:
         name: Its name.
-        calls_per_step: How often a step runs it; fractions for what is done once a chunk or only when recording.
-        us_per_train_step: Mean wall time a step and a train.
-        share: Of the loop.
-        estimated: Not timed in the loop: split off a fused launch by running the part alone, or what is left of it.
+        calls_per_step: Calls per step; a fraction for work that is done once a chunk or only when recording.
+        us_per_train_step: Mean wall time per step and train.
+        share: Share of the loop.
+        estimated: Not timed in the loop: a part of a fused launch, measured by running it alone, or the remainder.
     """
 
     name: str
@@ -63,12 +63,12 @@ class Loop:
     Attributes:
         real_time_factor: Wall time over simulated time of all trains together, without timers in the step.
         real_time_factor_per_train: The same over the number of trains.
-        steps_per_s: Steps of all trains together a second, likewise.
-        us_per_train_step: Mean with timers: what the stages add up to.
-        step_us_p50: Percentiles and maximum of whole steps of all trains together, with timers.
-        step_us_p90: 90 %.
-        step_us_p99: 99 %.
-        step_us_max: Longest.
+        steps_per_s: Steps of all trains together per second, without timers.
+        us_per_train_step: Mean with timers, the sum of all stages.
+        step_us_p50: Median of whole steps of all trains together, with timers.
+        step_us_p90: Their 90th percentile.
+        step_us_p99: Their 99th percentile.
+        step_us_max: Their maximum.
         measuring_overhead: Step with timers over step without, less one: median over neighbouring blocks.
     """
 
@@ -88,7 +88,7 @@ class Memory:
     """Memory of the process, in 10^6 bytes.
 
     Attributes:
-        peak_mb: Most that was held until the end of the loop.
+        peak_mb: Peak until the end of the loop.
         model_mb: Arrays of the model.
         state_mb: Arrays of the state.
         chunk_mb: Buffers of a chunk of steps.
@@ -105,13 +105,13 @@ class Rate:
     """Matrix products of a stage against the roofs.
 
     Attributes:
-        stage: Where they are done.
-        products_per_step: How many.
+        stage: Name of the stage.
+        products_per_step: Number of products.
         flops_per_step: Counted operations of all trains.
         bytes_per_step: Counted traffic.
-        gflops: Achieved.
-        gb_per_s: Achieved.
-        of_roof: Least time that the roofs allow over the time taken.
+        gflops: Achieved rate of operations.
+        gb_per_s: Achieved rate of traffic.
+        of_roof: Least time that the roofs allow over the measured time.
     """
 
     stage: str
@@ -125,24 +125,24 @@ class Rate:
 
 @dataclass(frozen=True)
 class ProfileReport:
-    """Everything a profile found.
+    """Result of a profile.
 
     Attributes:
         scenario: Name of the scenario.
         trains: Trains advanced together.
         time_step_s: Time step.
-        passes: Force passes a step.
+        passes: Force passes per step.
         dofs: Degrees of freedom of a train.
         warm_up_steps: Steps before the measurement.
         steps: Measured steps, with and without timers.
-        versions: Of Python and packages.
+        versions: Versions of Python and packages.
         machine: The computer.
-        wall: Times apart from the loop.
+        wall: Wall times apart from the loop.
         loop: The loop as a whole.
         stages: Its parts.
         memory: Memory.
-        roofs: What the machine can do.
-        rates: What the step's matrix products achieve.
+        roofs: Roofline of the machine.
+        rates: Rates that the step's matrix products achieve.
     """
 
     scenario: str
@@ -186,7 +186,7 @@ def read_json(path: Path) -> ProfileReport:
         raise InputError(f"{name}: must be a file that 'tiengine profile --json' wrote")
     version = tables.pop("format_version", None)
     if version != FORMAT_VERSION:
-        raise InputError(f"{name}: format version {version}; must be {FORMAT_VERSION}; profile anew with this tiengine")
+        raise InputError(f"{name}: format version {version}; must be {FORMAT_VERSION}; profile again with this version")
     try:
         return TypeAdapter(ProfileReport).validate_python(tables)
     except ValidationError as error:
@@ -201,7 +201,7 @@ class Comparison:
 
     Attributes:
         rows: Quantity, its value in the first and in the second report; None where one lacks the stage.
-        differences: What the two were not measured alike in, in words.
+        differences: Circumstances in which the two measurements differ, as sentences.
     """
 
     rows: tuple[tuple[str, float | None, float | None], ...]
@@ -231,7 +231,7 @@ def compare(first: ProfileReport, second: ProfileReport) -> Comparison:
 
 
 def _differences(first: ProfileReport, second: ProfileReport) -> list[str]:
-    """What makes two reports hard to compare."""
+    """Circumstances in which two measurements differ."""
     pairs: list[tuple[str, Any, Any]] = [
         (words, getattr(first, key), getattr(second, key))
         for words, key in (

@@ -1,9 +1,9 @@
 """Estimates for parts of the step that share a launch with others and cannot be timed in it.
 
-The suspension runs alone, by its stand-alone kernel, on the live state of one train copied many times: the
+The suspension runs alone, by its stand-alone kernel, on the present state of one train copied many times: the
 difference between many copies and one, over their number, is free of the cost of a public launch. Caches are warmer
-than in the step. Contact is what the launch takes longer with wheels than without; it starts from forces that it has
-found before, an iteration less than in the step at times.
+than in the step. The time of contact is that of the launch with wheels less that without; contact starts from forces
+that it has found before, at times with one iteration less than in the step.
 """
 
 from __future__ import annotations
@@ -13,11 +13,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
-from tiengine.model.model import Model
 
 __all__ = ["contact_us", "suspension_us"]
 
@@ -25,7 +23,7 @@ TRAIN_COPIES = 501  # below the 512 that Taichi gives one thread
 REPEATS = 40
 
 
-def contact_us(stepper: Stepper) -> float:
+def contact_us(stepper: SineStepper) -> float:
     """Contact of one train in the last pass [us]; leaves the state as it was."""
     state, dims, clock = stepper.state, stepper.model.dims, time.perf_counter_ns
     launch = [stage for name, stage in stepper.stages if name == "forces and contact"][-1]
@@ -44,10 +42,10 @@ def contact_us(stepper: Stepper) -> float:
     return max(0.0, float(with_wheels - without)) * 1e-3 / int(dims[at.TRAINS])
 
 
-def suspension_us(model: Model, state: State) -> float:
+def suspension_us(stepper: SineStepper) -> float:
     """One evaluation of one train's nonlinear elements [us]."""
-    train = model.given.train
-    motion = np.stack([state.view(row, "vehicles")[0] for row in (at.U, at.V, at.F)])
+    train = stepper.ingredients.train
+    motion = np.stack([stepper.state.view(row, "vehicles")[0] for row in (at.U, at.V, at.F)])
 
     def evaluate(trains: int) -> Callable[[], object]:
         many = np.tile(motion, trains)

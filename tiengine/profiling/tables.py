@@ -1,4 +1,4 @@
-"""A profile on the screen."""
+"""Tables of a profile for the screen."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def comparison_table(comparison: Comparison, names: Sequence[str]) -> Renderable
 
     Args:
         comparison: Their rows.
-        names: What to call the first and the second.
+        names: Names of the first and the second.
     """
     table = Table(box=None, pad_edge=False)
     table.add_column("")
@@ -41,7 +41,7 @@ def comparison_table(comparison: Comparison, names: Sequence[str]) -> Renderable
 
 
 def _facts(report: ProfileReport) -> Iterator[tuple[str, str]]:
-    """What was measured, where, and the numbers of the whole."""
+    """Circumstances of the measurement and numbers of the whole loop."""
     machine, wall, loop, memory, roofs = report.machine, report.wall, report.loop, report.memory, report.roofs
     yield "scenario", f"{report.scenario}, {report.dofs} DOFs a train, {report.passes} passes"
     yield "trains", str(report.trains)
@@ -112,7 +112,7 @@ def _rate(rate: Rate) -> tuple[str, ...]:
 
 
 def _size(count: float) -> str:
-    """A number of bytes in words."""
+    """Format a number of bytes."""
     for unit in ("B", "KiB", "MiB"):
         if count < 1024.0:
             return f"{count:.4g} {unit}"

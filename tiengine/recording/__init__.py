@@ -1,1 +1,1 @@
-"""Recording: what a run keeps of its state, and the guards that watch it."""
+"""Recording: records of a run's state, and the guards that check it."""

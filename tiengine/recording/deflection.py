@@ -1,4 +1,4 @@
-"""Rail and slab as the train bends them: snapshots all along the window."""
+"""Snapshots of the deflected rails and slabs along the whole window."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tiengine.engine.state import DISPLACEMENT
 from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.parameters.arrays import Reals
@@ -17,7 +18,7 @@ from tiengine.track.slab import Slab
 __all__ = ["Deflection", "window_points"]
 
 POINT_SPACING = 0.25
-"""About the distance of the points [m]: two or three between neighbouring seats."""
+"""Approximate distance of the points [m]: two or three between neighbouring seats."""
 
 
 def window_points(length: float) -> Reals:
@@ -30,8 +31,8 @@ class Deflection:
     """Snapshots of one run.
 
     Attributes:
-        stepper: What is watched.
-        every: Steps from one to the next.
+        stepper: Is watched.
+        every: Steps from one snapshot to the next.
         steps: Steps so far.
     """
 
@@ -40,11 +41,10 @@ class Deflection:
     steps: int = 0
 
     def __post_init__(self) -> None:
-        """Shapes of the rails at the points, and of the slabs under them as polynomials of x."""
-        model = self.stepper.model
-        slab = model.given.slab
-        self._points = window_points(model.given.length)
-        self._rail_shape = model.window.shape(self._points).T
+        """Bind the rails at the points; shapes of the slabs under them as polynomials of x."""
+        slab = self.stepper.ingredients.slab
+        self._points = window_points(self.stepper.ingredients.length)
+        self._rail = self.stepper.state.rail_deflection(self._points)
         self._slab_dofs = element_dofs(slab).reshape(slab.elements_x, slab.elements_y, 12)
         self._under_rails = [_cubic_along(slab, side * slab.seat_half_spacing) for side in (-1.0, 1.0)]
         self._snapshots: list[tuple[int, Reals]] = []
@@ -52,53 +52,47 @@ class Deflection:
     @property
     def point_offset(self) -> Reals:
         """Points forward of the first vehicle's centre [m]."""
-        return self._points - self.stepper.model.centre_s
+        return self._points - self.stepper.ingredients.centre_s
 
     @property
     def stage(self) -> str:
-        """What its part of a step is called."""
+        """Name of its stage of the step."""
         return "deflection"
 
     def watch(self) -> None:
         """Take a snapshot if it is time for one."""
         self.steps += 1
         if self.steps % self.every == 0:
-            self._snapshots.append((self.stepper.asked[0], np.stack([self._rail(), self._slab()])))
+            self._snapshots.append((self.stepper.rows.step, np.stack([self._rail(), self._slab()])))
 
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
         """Snapshots of the chunk whose steps end at the given times [s], with the train at the given chainages [m]."""
         taken, self._snapshots = self._snapshots, []
         steps = np.array([step for step, _ in taken], dtype=np.int64)
-        trains = int(self.stepper.model.dims[at.TRAINS])
+        trains = self.stepper.state.trains
         none = np.empty((2, 0, trains, 2, len(self._points)))
         rail, slab = np.concatenate([none, *(bent[:, None] for _, bent in taken)], axis=1)
         return [Block(time[steps], position[steps], {"rail": rail[:, b], "slab": slab[:, b]}) for b in range(trains)]
 
-    def rest(self) -> list[Block]:
+    def remainder(self) -> list[Block]:
         """Nothing is kept back."""
         return []
 
     def saved(self) -> dict[str, Reals]:
-        """What the coming snapshots depend on."""
+        """Values that the coming snapshots depend on."""
         return {"steps": np.array(float(self.steps))}
 
     def restore(self, saved: Mapping[str, Reals]) -> None:
-        """Go on from what :meth:`saved` gave."""
+        """Continue from the values of :meth:`saved`."""
         self.steps = int(saved["steps"])
-
-    def _rail(self) -> Reals:
-        """Deflection of the rails [m], shape (B, 2, points)."""
-        rails = self.stepper.state.view(at.U, "vertical")[..., : self.stepper.model.given.modes]
-        return np.asarray(rails @ self._rail_shape)
 
     def _slab(self) -> Reals:
         """Deflection of the slabs under the rails [m], shape (B, 2, points); NaN where there is none."""
-        state, slab = self.stepper.state, self.stepper.model.given.slab
-        chainage = self.stepper.chunk.clock[self.stepper.asked[0], at.POSITION] + self._points
+        state, slab = self.stepper.state, self.stepper.ingredients.slab
+        chainage = self.stepper.chunk.clock[self.stepper.rows.step, at.POSITION] + self._points
         number = np.floor(chainage / slab.pitch).astype(np.int64)
         x = chainage - (number + 0.5) * slab.pitch
-        motion = state.view(at.U, "slabs")
-        slots = motion.shape[1]
+        motion, slots = state.slab_motion(DISPLACEMENT), state.slots
         there = np.flatnonzero((np.abs(x) <= slab.length / 2.0) & (number < state.first_slab + slots))
         found = np.full((len(motion), 2, len(x)), np.nan)
         ex, xi = locate(x[there], slab.length, slab.elements_x)

@@ -1,11 +1,11 @@
-"""What gauges see: the motion of a place of rail or slab, the force of a fastening, while the window is over them.
+"""Samples of gauges: motion of a place of rail or slab, force of a fastening, while the window is over them.
 
-The rail's fields are those of the window, w(s, t) = sum q_i(t) phi_i(s) with s = x - X(t). At a fixed x the rate is
-D = d/dt - V d/ds, so that with V = dX/dt and a = dV/dt
+The rail's fields are those of the window, w(s, t) with s = x - X(t). At a fixed x the rate is D = d/dt - V d/ds, so
+that with V = dX/dt and a = dV/dt
 
-    w = q phi        Dw = q' phi - V q phi,s        D^2 w = q'' phi - 2 V q' phi,s + V^2 q phi,ss - a q phi,s
+    Dw = w' - V w,s        D^2 w = w'' - 2 V w',s + V^2 w,ss - a w,s
 
-where primes on q are rates at constant s. Slabs stand still: their rates are those of their coordinates.
+where primes are rates at constant s. Slabs stand still: their rates are those of their coordinates.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Protocol
 
 import numpy as np
 
-from tiengine.engine.state import State
+from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
 from tiengine.engine.stepper import Stepper
-from tiengine.kernels import layout as at
-from tiengine.model.model import Model
+from tiengine.model.model import Ingredients
 from tiengine.parameters.arrays import Reals
+from tiengine.parameters.conventions import SIDES
 from tiengine.recording.seat_envelopes import watched_seats
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION
 from tiengine.result_files.layout import Block
@@ -29,15 +29,14 @@ from tiengine.track.plate_shapes import W, shapes_at
 
 __all__ = ["GaugeSamples", "gauge_samples"]
 
-ROWS = (at.U, at.V, at.A)
-SIDES = {"left": 0, "right": 1}
+KINDS = (DISPLACEMENT, VELOCITY, ACCELERATION)
 
 
 class Place(Protocol):
-    """What is watched."""
+    """Place that a gauge watches."""
 
     def read(self, X: float, V: float, V_rate: float) -> Reals | None:
-        """Its channels, shape (channels, B, ...), or None if it lies outside the window.
+        """Read its channels, shape (channels, B, ...), or None if it lies outside the window.
 
         Args:
             X: Chainage of the window's rear end [m].
@@ -51,34 +50,25 @@ class RailPlace:
     """A place of a rail.
 
     Attributes:
-        model, state: What is watched.
+        state: Is watched.
+        length: Of the window [m].
         chainage: Of the place [m].
         side: 0 left, 1 right.
     """
 
-    model: Model
     state: State
+    length: float
     chainage: float
     side: int
-
-    def __post_init__(self) -> None:
-        """Views of v and w: displacement, rate, second rate, each (B, N)."""
-        n = self.model.given.modes
-        self._fields = [
-            [self.state.view(row, block)[:, self.side, :n] for row in ROWS] for block in ("lateral", "vertical")
-        ]
-        self._k = self.model.window.wave_numbers
 
     def read(self, X: float, V: float, V_rate: float) -> Reals | None:
         """Displacement, velocity, acceleration to the right and down, shape (3, B, 2)."""
         s = self.chainage - X
-        if not 0.0 <= s <= self.model.given.length:
+        if not 0.0 <= s <= self.length:
             return None
-        sine, cosine = np.sin(self._k * s), np.cos(self._k * s)
-        shapes = np.stack([sine, self._k * cosine, -(self._k**2) * sine], axis=1)
-        found = np.empty((3, len(self.state.design), 2))
-        for direction, rows in enumerate(self._fields):
-            (u, u_s, u_ss), (v, v_s, _), (a, *_) = ((row @ shapes).T for row in rows)
+        found = np.empty((3, self.state.trains, 2))
+        for direction, motion in enumerate(self.state.rail_motion(self.side, s)):
+            (u, u_s, u_ss), (v, v_s, _), (a, *_) = motion
             found[0, :, direction] = u
             found[1, :, direction] = v - V * u_s
             found[2, :, direction] = a - 2.0 * V * v_s + V**2 * u_ss - V_rate * u_s
@@ -90,33 +80,33 @@ class SlabPlace:
     """A place of a slab.
 
     Attributes:
-        model, state: What is watched.
+        state: Is watched.
+        ingredients: Give slab and window.
         chainage: Of the place [m].
         y: From the centre line, to the right [m].
     """
 
-    model: Model
     state: State
+    ingredients: Ingredients
     chainage: float
     y: float
 
     def __post_init__(self) -> None:
         """Shapes at the place."""
-        slab = self.model.given.slab
+        slab = self.ingredients.slab
         self._slab, self._x = slab_under(self.chainage, slab)
         index, table = shapes_at(slab, np.array([self._x]), np.array([self.y]))
         self._index, self._shape = index[0], table[0, W]
-        slot = self._slab % self.model.given.slots
-        self._motion = [self.state.view(row, "slabs")[:, slot] for row in ROWS]
 
     def read(self, X: float, V: float, V_rate: float) -> Reals | None:
         """Displacement, velocity, acceleration to the right and down, shape (3, B, 2)."""
-        first = self.state.first_slab
-        inside = 0.0 <= self.chainage - X <= self.model.given.length
-        if not (inside and first <= self._slab < first + self.model.given.slots):
+        first, slots = self.state.first_slab, self.state.slots
+        inside = 0.0 <= self.chainage - X <= self.ingredients.length
+        if not (inside and first <= self._slab < first + slots):
             return None
-        found = np.empty((3, len(self.state.design), 2))
-        for kind, motion in enumerate(self._motion):
+        found = np.empty((3, self.state.trains, 2))
+        for kind in KINDS:
+            motion = self.state.slab_motion(kind)[:, self._slab % slots]
             found[kind, :, 0] = motion[:, -2] + self._x * motion[:, -1]  # rigid in its plane
             found[kind, :, 1] = motion[:, self._index] @ self._shape
         return found
@@ -127,7 +117,7 @@ class SeatPlace:
     """A fastening.
 
     Attributes:
-        state: What is watched.
+        state: Is watched.
         seat: Its index.
         side: 0 left, 1 right.
         places: First and end of the window's places where forces are those of fastenings alone.
@@ -143,7 +133,7 @@ class SeatPlace:
         place = self.seat - self.state.first_seat
         if not self.places[0] <= place < self.places[1]:
             return None
-        return self.state.seat_force[:, self.side, :2, place].T.copy()
+        return self.state.seat_forces[:, self.side, :2, place].T.copy()
 
 
 @dataclass(eq=False)
@@ -151,9 +141,9 @@ class GaugeSamples:
     """Samples of one gauge, at the wheels' interval.
 
     Attributes:
-        stepper: What is watched.
-        place: Where.
-        channels: Names of what is read there.
+        stepper: Is watched.
+        place: Where it is.
+        channels: Names of the quantities that are read there.
         empty: No samples, shape (0, channels, B, ...).
     """
 
@@ -166,12 +156,12 @@ class GaugeSamples:
 
     @property
     def stage(self) -> str:
-        """What its part of a step is called."""
+        """Name of its stage of the step."""
         return "gauges"
 
     def watch(self) -> None:
-        """Read, if the step is one that the wheels are asked for."""
-        step, row, _ = self.stepper.asked
+        """Read, if the step records the wheels."""
+        step, row, _ = self.stepper.rows
         if row < 0:
             return
         X, V, V_rate = self.stepper.chunk.clock[step, :3].tolist()
@@ -190,7 +180,7 @@ class GaugeSamples:
             for b in range(values.shape[2])
         ]
 
-    def rest(self) -> list[Block]:
+    def remainder(self) -> list[Block]:
         """Nothing is kept back."""
         return []
 
@@ -199,7 +189,7 @@ class GaugeSamples:
         return {}
 
     def restore(self, saved: Mapping[str, Reals]) -> None:
-        """Nothing to go on from."""
+        """Nothing to continue from."""
 
 
 def gauge_samples(gauge: Gauge, stepper: Stepper) -> GaugeSamples:
@@ -207,16 +197,15 @@ def gauge_samples(gauge: Gauge, stepper: Stepper) -> GaugeSamples:
 
     Args:
         gauge: A checked gauge.
-        stepper: What it watches.
+        stepper: Is watched.
     """
-    model, state = stepper.model, stepper.state
-    trains = len(state.design)
+    ingredients, state, trains = stepper.ingredients, stepper.state, stepper.state.trains
     if gauge.on == "fastening":
-        seat = nearest_seat(gauge.chainage, model.given.slab)
-        place: Place = SeatPlace(state, seat, SIDES[gauge.side or "left"], watched_seats(model))
+        seat = nearest_seat(gauge.chainage, ingredients.slab)
+        place: Place = SeatPlace(state, seat, SIDES.index(gauge.side or "left"), watched_seats(ingredients))
         return GaugeSamples(stepper, place, tuple(GAUGE_FORCE), np.empty((0, 2, trains)))
     if gauge.on == "rail":
-        place = RailPlace(model, state, gauge.chainage, SIDES[gauge.side or "left"])
+        place = RailPlace(state, ingredients.length, gauge.chainage, SIDES.index(gauge.side or "left"))
     else:
-        place = SlabPlace(model, state, gauge.chainage, gauge.y or 0.0)
+        place = SlabPlace(state, ingredients, gauge.chainage, gauge.y or 0.0)
     return GaugeSamples(stepper, place, tuple(GAUGE_MOTION), np.empty((0, 3, trains, 2)))

@@ -1,4 +1,4 @@
-"""What can go wrong with the physics of a run: looked for every millisecond of simulated time.
+"""Guards: check every millisecond of simulated time whether a train derails or its numbers run away.
 
 Numbers that run away end a train. A derailment, a flange that climbs, a wheel that stays off its rail and a measured
 track that ends are events: they go into the file and onto the screen, and the scenario says whether they end the train.
@@ -12,21 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
+from tiengine.engine.state import PARTS
 from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
-from tiengine.kernels.wheel_rail import SHIFT
-from tiengine.result_files.channels import DOFS, SIDES
+from tiengine.parameters.conventions import SIDES
+from tiengine.result_files.channels import DOFS
 from tiengine.result_files.events import EVENT_KINDS, Event
 from tiengine.scenario.event_policy import Events
 
 __all__ = ["Guard", "Watch"]
 
 EVERY = 1e-3
-"""Simulated time between two looks [s]."""
+"""Simulated time between two checks [s]."""
 
-LIMITS = {at.U: 10.0, at.V: 1e3, at.A: 1e7}
-"""Largest coordinate [m, rad], rate and acceleration that a track or a train can have and still be one: a flat of
-the wheel accelerates a slab by some 1e3 m/s^2 and no body moves by metres."""
+LIMITS = (10.0, 1e3, 1e7)
+"""Largest coordinate [m, rad], rate and acceleration of a sound run: a wheel flat accelerates a slab by about
+1e3 m/s^2, and no body moves by metres."""
 
 STEEPEST = 0.98
 """A flange climbs where its slope falls below this part of the steepest; the straight flank varies by 1 %."""
@@ -37,11 +38,11 @@ QUIET = 1.0
 
 @dataclass(eq=False)
 class Watch:
-    """What the guard remembers from look to look; a checkpoint saves it.
+    """Memory of the guard from check to check; a checkpoint saves it.
 
     Attributes:
         lifted: How long each wheel has carried nothing [s], shape (B, W, 2).
-        last: When a wheel was last seen in each kind of trouble [s], shape (kinds of wheels, B, W, 2).
+        last: Time at which each kind of event was last found at a wheel [s], shape (kinds, B, W, 2).
         ended: Whether the end of the measured track was passed, shape (B,).
     """
 
@@ -51,20 +52,20 @@ class Watch:
 
     @classmethod
     def fresh(cls, trains: int, wheelsets: int) -> Watch:
-        """Nothing has happened yet."""
+        """Memory before the first check."""
         wheels = (trains, wheelsets, 2)
         return cls(np.zeros(wheels), np.full((3, *wheels), -np.inf), np.zeros(trains, dtype=np.bool_))
 
 
 @dataclass(eq=False)
 class Guard:
-    """Looks at the state of trains between steps.
+    """Checks the state of trains between steps.
 
     Attributes:
-        stepper: Whose state is looked at.
-        policy: Of the scenario.
+        stepper: Its state is checked.
+        policy: Consequences of each event, from the scenario.
         track_end: Chainage where each train's measured track ends [m], infinite without, shape (B,).
-        watch: What is remembered.
+        watch: Memory from check to check.
         found: Events since they were last taken, by place of the train.
         stopped: Number of the step in which a train was stopped, by its place.
     """
@@ -77,34 +78,34 @@ class Guard:
     stopped: dict[int, int] = field(default_factory=dict)
 
     @classmethod
-    def beside(cls, stepper: Stepper, policy: Events, track_end: NDArray[np.float64]) -> Guard:
-        """A guard that has seen nothing yet, as a last stage of the stepper.
+    def watching(cls, stepper: Stepper, policy: Events, track_end: NDArray[np.float64]) -> Guard:
+        """New guard, called by the stepper after each step.
 
         Args:
             stepper: Is watched.
-            policy: Of the scenario.
+            policy: Consequences of each event, from the scenario.
             track_end: See the class.
         """
-        dims = stepper.model.dims
-        guard = cls(stepper, policy, track_end, Watch.fresh(int(dims[at.TRAINS]), int(dims[at.WHEELSETS])))
-        stepper.stages = (*stepper.stages, ("guards", guard.watch_step))
+        trains, wheelsets, _ = stepper.state.normal_force.shape
+        guard = cls(stepper, policy, track_end, Watch.fresh(trains, wheelsets))
+        stepper.watch("guards", guard.watch_step)
         return guard
 
     def __post_init__(self) -> None:
-        """Keep what every look needs."""
-        self.model, self.state = self.stepper.model, self.stepper.state
+        """Keep what every check needs."""
+        self.state, ingredients = self.stepper.state, self.stepper.ingredients
+        self._dt, self._train = ingredients.newmark.dt, ingredients.train
         self._done, self._position = 0, np.zeros(0)
-        self._flying = True  # as far as is known: a checkpoint may have brought wheels in flight
-        self.every = max(int(EVERY / self.model.given.newmark.dt + 1e-9), 1)
-        self._rows = [(self.state.motion[row], limit * limit) for row, limit in LIMITS.items()]
-        self._shift, self._normal = self.state.contact[..., SHIFT], self.state.force[..., 0]
-        table = self.model.given.contact
+        self._flying = True  # until checked: a checkpoint may have brought wheels in flight
+        self.every = max(int(EVERY / self._dt + 1e-9), 1)
+        self._shift, self._normal = self.state.relative_shift, self.state.normal_force
+        table = ingredients.contact
         self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
-        self._wheel_front = float(self.model.given.train.wheelset_x.max())
+        self._wheel_front = float(self._train.wheelset_x.max())
         self._nearest_end = float(self.track_end.min())
 
     def load(self, done: int, position: NDArray[np.float64]) -> None:
-        """Know the coming steps.
+        """Take the numbers and places of the coming steps.
 
         Args:
             done: Steps before them.
@@ -113,21 +114,22 @@ class Guard:
         self._done, self._position = done, position
 
     def watch_step(self) -> None:
-        """Look at the end of a step if it is time to, and after the last that is known."""
-        i = self.stepper.asked[0]
+        """Check at the end of a step if it is time to, and after the last of a chunk."""
+        i = self.stepper.rows.step
         step = self._done + i + 1
         if step % self.every == 0 or i + 1 == len(self._position):
-            self.look(step, float(self._position[i]))
+            self.check(step, float(self._position[i]))
 
-    def look(self, step: int, position: float) -> None:
-        """Look at the state after a step.
+    def check(self, step: int, position: float) -> None:
+        """Check the state after a step.
 
         Args:
             step: Its number, from 1.
             position: Chainage of the first vehicle's centre [m].
         """
-        time = step * self.model.given.newmark.dt
-        if not all(float(np.dot(row, row)) < limit for row, limit in self._rows):  # not a number is not less, either
+        time = step * self._dt
+        squares = zip(self.state.squares(), LIMITS, strict=True)
+        if not all(square < limit * limit for square, limit in squares):  # not a number is not less, either
             self._runaway(step, time, position)
         if not self._normal.min() > 0.0:
             self._lifts(step, time, position)
@@ -139,20 +141,20 @@ class Guard:
             self._track_ends(step, time, position)
 
     def _lifts(self, step: int, time: float, position: float) -> None:
-        """Wheels that carry nothing, for how long."""
+        """Report wheels that have carried nothing for too long."""
         lifted, self._flying = self.watch.lifted, True
-        lifted += self.every * self.model.given.newmark.dt
+        lifted += self.every * self._dt
         lifted[self._normal > 0.0] = 0.0
         lasting = lifted >= self.policy.wheel_lift_time
-        self._wheels(2, lasting, step, time, position, f"off the rail for {self.policy.wheel_lift_time:g} s")
+        self._report_wheels(2, lasting, step, time, position, f"off the rail for {self.policy.wheel_lift_time:g} s")
 
     def _climbs(self, step: int, time: float, position: float) -> None:
-        """Wheels beyond the steepest part of their flange, or beyond their profile."""
+        """Report wheels beyond the steepest part of their flange, or beyond their profile."""
         climbs = (self._shift > self._climb) & (self._normal > 0.0)
         words = f"climbs on its flange: lateral shift beyond {self._climb * 1e3:.1f} mm"
-        self._wheels(1, climbs, step, time, position, words)
+        self._report_wheels(1, climbs, step, time, position, words)
         words = f"derailed: lateral shift beyond {self._derailed * 1e3:.1f} mm on the flange side"
-        self._wheels(0, self._shift > self._derailed, step, time, position, words)
+        self._report_wheels(0, self._shift > self._derailed, step, time, position, words)
 
     def take(self) -> dict[int, list[Event]]:
         """Events since the last call, by place of the train."""
@@ -160,21 +162,23 @@ class Guard:
         return found
 
     def _report(self, train: int, step: int, event: Event) -> None:
-        """Note an event of a train that still runs."""
+        """Keep an event of a train that still runs."""
         if train in self.stopped:
             return
         self.found.setdefault(train, []).append(event)
         if event.stops:
             self.stopped[train] = step
 
-    def _wheels(self, kind: int, wrong: NDArray[np.bool_], step: int, time: float, position: float, words: str) -> None:
-        """Report wheels in trouble, each at the beginning of it."""
+    def _report_wheels(
+        self, kind: int, affected: NDArray[np.bool_], step: int, time: float, position: float, words: str
+    ) -> None:
+        """Report wheels with an event, each when it begins."""
         name, last = EVENT_KINDS[kind], self.watch.last[kind]
         stops = getattr(self.policy, name) == "stop"
-        for train, wheelset, side in np.argwhere(wrong & (last < time - QUIET)):
+        for train, wheelset, side in np.argwhere(affected & (last < time - QUIET)):
             sentence = f"wheelset {wheelset + 1} {SIDES[side]} {words}"
             self._report(int(train), step, Event(name, time, position, int(wheelset) + 1, SIDES[side], sentence, stops))
-        last[wrong] = time
+        last[affected] = time
 
     def _track_ends(self, step: int, time: float, position: float) -> None:
         for train in np.flatnonzero((position + self._wheel_front > self.track_end) & ~self.watch.ended):
@@ -184,15 +188,15 @@ class Guard:
             self._report(int(train), step, Event("track_end", time, position, 0, "", words, stops))
 
     def _runaway(self, step: int, time: float, position: float) -> None:
-        """Say which trains' numbers have run away, and what of them first."""
-        for train in range(int(self.model.dims[at.TRAINS])):
+        """Report the trains whose numbers have run away, and the part of them that was first."""
+        for train in range(self.state.trains):
             found = self._excess(train)
             worst = max(excess for excess, _ in found)
             if worst < 1.0:
                 continue
             first = [words for excess, words in found if excess == worst]  # several, once all are not-a-numbers
             what = first[0] if len(first) == 1 else f"one of {', '.join(first)}"
-            shorter = 0.5 * self.model.given.newmark.dt
+            shorter = 0.5 * self._dt
             words = (
                 f"numbers ran away, first of {what}; try numerics.time_step = {shorter:g}, more passes, or look at the"
                 " irregularity there"
@@ -204,23 +208,24 @@ class Guard:
         """Largest coordinate over its limit, and its words, of every part of a train."""
         found = []
         with np.errstate(over="ignore", invalid="ignore"):
-            for block in ("vehicles", "vertical", "lateral", "slabs"):
-                rows = np.stack([np.abs(self.state.view(row, block)[train]) / limit for row, limit in LIMITS.items()])
+            for part in PARTS:
+                motion = zip(self.state.part(train, part), LIMITS, strict=True)
+                rows = np.stack([np.abs(row) / limit for row, limit in motion])
                 rows[~np.isfinite(rows)] = np.inf
                 place = np.unravel_index(int(rows.argmax()), rows.shape)[1:]
-                found.append((float(rows.max()), self._words(block, [int(i) for i in place])))
+                found.append((float(rows.max()), self._words(part, [int(i) for i in place])))
         return found
 
-    def _words(self, block: str, place: list[int]) -> str:
-        """A coordinate in words."""
-        if block == "slabs":
-            slots, rear = self.state.design.shape[1], self.state.first_slab
+    def _words(self, part: str, place: list[int]) -> str:
+        """Describe a coordinate."""
+        if part == "slabs":
+            slots, rear = self.state.slots, self.state.first_slab
             return f"slab {rear + (place[0] - rear) % slots}"
-        if block == "vehicles":
-            bodies = self.model.given.train.body_names
+        if part == "vehicles":
+            bodies = self._train.body_names
             body, dof = divmod(place[0], len(DOFS))
             return f"body {bodies[body]} ({DOFS[dof]})" if body < len(bodies) else "a damper in series with its spring"
-        return f"the {SIDES[place[0]]} rail, {block}ly"
+        return f"the {SIDES[place[0]]} rail, {part}ly"
 
 
 def climbing_shift(table: ContactTable) -> float:

@@ -1,4 +1,4 @@
-"""From the buffers that the kernels fill to the channels of the result file."""
+"""Channels of the result file from the records that the steps fill."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.engine.stepper import Chunk
+from tiengine.engine.chunk import Chunk
 from tiengine.kernels import layout as at
 from tiengine.result_files.channels import MORTAR
-from tiengine.result_files.layout import DTYPES
-from tiengine.result_files.writer import Block, GroupSpec, TrainLabels, Writer
+from tiengine.result_files.layout import DTYPES, Block, GroupSpec, TrainLabels
 from tiengine.scenario.scenario import Scenario
 from tiengine.vehicle.train import TrainModel
 
@@ -42,7 +41,7 @@ BODY_ROWS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """What one train recorded in a chunk of steps.
+    """Records of one train in a chunk of steps.
 
     Attributes:
         wheel: Output of the wheels, see ``layout``, shape (rows, W, 2, N_WHEEL).
@@ -59,7 +58,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Recorder:
-    """Decides which steps are recorded, and writes them.
+    """Decides which steps are recorded, and makes the blocks that are written.
 
     Attributes:
         scenario: Gives channels and intervals.
@@ -104,12 +103,12 @@ class Recorder:
         return np.asarray(np.arange(first, first + count) * self.dt, np.float64)
 
     def groups(self) -> dict[str, GroupSpec]:
-        """What each train records."""
+        """Groups that each train records."""
         return self.groups_of(self.scenario)
 
     @staticmethod
     def groups_of(scenario: Scenario) -> dict[str, GroupSpec]:
-        """What each train of a scenario records."""
+        """Groups that each train of a scenario records."""
         out = scenario.output
         return {
             "wheel": GroupSpec.standard("wheel", out.wheel_channels),
@@ -128,22 +127,10 @@ class Recorder:
             slots=slots,
         )
 
-    def write(self, writer: Writer, chunk: Chunk, first: int, position: NDArray[np.float64]) -> None:
-        """Append a chunk of steps to every train of the file.
-
-        Args:
-            writer: The open file.
-            chunk: Filled buffers.
-            first: Number of the chunk's first step, counted from 1 (the state after one step).
-            position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
-        """
-        for train, blocks in enumerate(self.blocks(chunk, first, position, range(len(chunk.wheel)))):
-            writer.write(train, blocks)
-
     def blocks(
         self, chunk: Chunk, first: int, position: NDArray[np.float64], rows: Iterable[int]
     ) -> list[dict[str, Block]]:
-        """What some trains of a chunk have to write.
+        """Blocks of some trains to be written after a chunk of steps.
 
         Args:
             chunk: Filled buffers.
@@ -152,7 +139,7 @@ class Recorder:
             rows: Places of the trains in the chunk.
 
         Returns:
-            For each of these trains its groups; arrays of its own, times shared between trains.
+            Groups of each of these trains; the arrays are copies, times are shared between trains.
         """
         times = self._times(np.arange(first, first + len(position)), position)
         at_bodies = np.arange(first, first + len(position)) % self.body_every == 0
@@ -160,19 +147,15 @@ class Recorder:
         held = _slabs_held(chunk.clock[: len(position)][at_bodies, at.FIRST_SLAB], pressure.shape[2])
         return [self._block(Samples(chunk.wheel[b], chunk.body[b], held, pressure[b]), times) for b in rows]
 
-    def append(
-        self, writer: Writer, train: int, samples: Samples, steps: NDArray[np.int64], position: NDArray[np.float64]
-    ) -> None:
-        """Append samples to one train of the file.
+    def block(self, samples: Samples, steps: NDArray[np.int64], position: NDArray[np.float64]) -> dict[str, Block]:
+        """Blocks of one train.
 
         Args:
-            writer: The open file.
-            train: Its number.
-            samples: Of those steps that are recorded; rows beyond them are ignored.
+            samples: Records of those steps that are recorded; rows beyond them are ignored.
             steps: Numbers of the steps, counted from 1, shape (steps,).
             position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
         """
-        writer.write(train, self._block(samples, self._times(steps, position)))
+        return self._block(samples, self._times(steps, position))
 
     def _times(self, steps: NDArray[np.int64], position: NDArray[np.float64]) -> tuple[Times, Times]:
         """Times [s] and chainages [m] of the wheels' samples and of the bodies'."""
@@ -185,7 +168,7 @@ class Recorder:
         out, (at_wheels, at_bodies) = self.scenario.output, times
         wheels, bodies = len(at_wheels[0]), len(at_bodies[0])
         wheel, body = samples.wheel[:wheels], samples.body[:bodies]
-        felt = {name: wheel[..., IRREGULARITY_COLUMNS[name]] for name in out.irregularity_channels}
+        irregularity = {name: wheel[..., IRREGULARITY_COLUMNS[name]] for name in out.irregularity_channels}
         forces = {name: wheel[..., WHEEL_COLUMNS[name]] for name in out.wheel_channels}
         shape = (bodies, body.shape[-1] // 5, 5)  # a short last chunk may hold no sample of the bodies
         motion = {name: body[:, BODY_ROWS[name]].reshape(shape) for name in out.body_channels}
@@ -193,13 +176,13 @@ class Recorder:
         bed = {"slab": samples.slab[:bodies], "largest_pressure": largest, "smallest_pressure": smallest}
         return {
             "wheel": self._cast(at_wheels, forces),
-            "irregularity": self._cast(at_wheels, felt),
+            "irregularity": self._cast(at_wheels, irregularity),
             "body": self._cast(at_bodies, motion),
             "mortar": self._cast(at_bodies, bed),
         }
 
     def _cast(self, times: Times, channels: dict[str, NDArray[np.float64]]) -> Block:
-        """Copies, since the buffers are filled anew; in the file's precision, which halves what workers send."""
+        """Copy, since the buffers are filled again; in the file's precision, to halve the data that workers send."""
         dtype = DTYPES[self.scenario.output.precision]
         return Block(*times, {name: np.array(value, dtype) for name, value in channels.items()})
 

@@ -1,6 +1,6 @@
-"""Extremes of every seat and slab over a whole run.
+"""Extremes of every seat over a whole run.
 
-Running extremes are kept of what the window holds. A seat or slab that it leaves behind is put aside and goes to the
+Running extremes are kept of all seats in the window. A seat that the window leaves behind is put aside and goes to the
 file with the chunk; at the end of the run so do those still in the window, some of which the train has not passed.
 """
 
@@ -12,23 +12,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tiengine.engine.state import State
 from tiengine.engine.stepper import Stepper
-from tiengine.kernels import layout as at
-from tiengine.model.model import Model
+from tiengine.model.model import Ingredients
 from tiengine.parameters.arrays import Reals
 from tiengine.result_files.layout import Block
 
 __all__ = ["SeatEnvelopes", "watched_seats"]
 
 
-def watched_seats(model: Model) -> tuple[int, int]:
-    """Places of the window (first, end) where forces are those of fastenings alone.
+def watched_seats(ingredients: Ingredients) -> tuple[int, int]:
+    """Places of the window (first, end) where the seats' forces are those of fastenings alone.
 
     Whatever the phase 0 < s_0 <= d of the seats, those in these places stand inside the window and outside its
     absorbing zones, where springs to the ground add to the forces on the rail.
     """
-    zone, length, spacing = (float(model.constants[i]) for i in (at.ABSORBING_ZONE, at.LENGTH, at.SPACING))
+    zone, length, spacing = ingredients.absorbing_zone, ingredients.length, ingredients.slab.fastening_pitch
     return math.ceil(zone / spacing - 1e-9), math.floor((length - zone) / spacing + 1e-9)
 
 
@@ -37,14 +35,13 @@ class SeatEnvelopes:
     """Extremes of the fastenings' forces over every step.
 
     Attributes:
-        model, state: What is watched.
-        largest, smallest: Of the seat at each place of the window, shape (B, 2, 3, seats), rows as
-            ``State.seat_force``; places before the watched ones hold nothing of use.
+        stepper: Is watched.
+        largest, smallest: Extremes of the seat at each place of the window, shape (B, 2, 3, seats), rows as
+            ``State.seat_forces``; places before the watched ones hold nothing of use.
         first_seat: Rear seat, -1 before the first step.
     """
 
-    model: Model
-    state: State
+    stepper: Stepper
     largest: Reals
     smallest: Reals
     first_seat: int = -1
@@ -52,32 +49,32 @@ class SeatEnvelopes:
 
     @classmethod
     def of(cls, stepper: Stepper) -> SeatEnvelopes:
-        """Nothing seen yet."""
-        state = stepper.state
-        return cls(
-            stepper.model, state, np.full_like(state.seat_force, -np.inf), np.full_like(state.seat_force, np.inf)
-        )
+        """Envelopes before the first step."""
+        shape = stepper.state.seat_forces.shape
+        return cls(stepper, np.full(shape, -np.inf), np.full(shape, np.inf))
 
     @property
     def stage(self) -> str:
-        """What its part of a step is called."""
+        """Name of its stage of the step."""
         return "envelopes"
 
     def watch(self) -> None:
         """Take in the forces of a step."""
-        if self.state.first_seat != self.first_seat:
-            self._move(self.state.first_seat)
-        np.maximum(self.largest, self.state.seat_force, out=self.largest)
-        np.minimum(self.smallest, self.state.seat_force, out=self.smallest)
+        state, forces = self.stepper.state, self.stepper.state.seat_forces
+        if state.first_seat != self.first_seat:
+            self._move(state.first_seat)
+        np.maximum(self.largest, forces, out=self.largest)
+        np.minimum(self.smallest, forces, out=self.smallest)
 
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
         """Seats that were left behind, train by train; neither times nor positions matter."""
+        ingredients = self.stepper.ingredients
         left, self._left = self._left, []
         none = np.empty((2, *self.largest.shape[:-1], 0))
         seats = np.concatenate([np.arange(0), *(first + np.arange(found.shape[-1]) for first, found in left)])
         largest, smallest = np.concatenate([none, *(found for _, found in left)], axis=-1)
-        factor = np.concatenate([np.ones((0, 2)), *(self.model.given.seat_factors(int(seat), 1) for seat in seats)])
-        chainage: Reals = (seats + 0.5) * float(self.model.constants[at.SPACING])
+        factor = np.concatenate([np.ones((0, 2)), *(ingredients.seat_factors(int(seat), 1) for seat in seats)])
+        chainage: Reals = (seats + 0.5) * ingredients.slab.fastening_pitch
         return [
             Block(
                 seats,
@@ -93,31 +90,31 @@ class SeatEnvelopes:
             for b in range(len(largest))
         ]
 
-    def rest(self) -> list[Block]:
+    def remainder(self) -> list[Block]:
         """Seats still in the window."""
-        first, end = watched_seats(self.model)
+        first, end = watched_seats(self.stepper.ingredients)
         if self.first_seat >= 0:
             self._put_aside(end - first)
         return self.blocks(np.zeros(0), np.zeros(0))
 
     def saved(self) -> dict[str, Reals]:
-        """What the coming seats depend on, when nothing is put aside."""
+        """Values that the coming seats depend on, when nothing is put aside."""
         return {"largest": self.largest, "smallest": self.smallest, "first": np.array(float(self.first_seat))}
 
     def restore(self, saved: Mapping[str, Reals]) -> None:
-        """Go on from what :meth:`saved` gave."""
+        """Continue from the values of :meth:`saved`."""
         self.largest[:], self.smallest[:] = saved["largest"], saved["smallest"]
         self.first_seat = int(saved["first"])
 
     def _put_aside(self, count: int) -> None:
-        """The rear ``count`` of the watched seats."""
-        first, _ = watched_seats(self.model)
+        """Put aside the rear ``count`` of the watched seats."""
+        first, _ = watched_seats(self.stepper.ingredients)
         rear = slice(first, first + count)
         self._left.append((self.first_seat + first, np.stack([self.largest[..., rear], self.smallest[..., rear]])))
 
     def _move(self, first_seat: int) -> None:
-        """Shift the seats to their new places; those that come to be watched begin anew."""
-        _, end = watched_seats(self.model)
+        """Shift the seats to their new places; seats that enter the watched part start again."""
+        _, end = watched_seats(self.stepper.ingredients)
         passed = first_seat - self.first_seat
         if self.first_seat >= 0:
             self._put_aside(passed)

@@ -1,4 +1,4 @@
-"""Extremes of what is seen of every slab while it is in memory, in arrays of the window's size."""
+"""Extremes of every slab while it is in memory, in arrays of the window's size."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.state import DISPLACEMENT
 from tiengine.engine.stepper import Stepper
-from tiengine.kernels import layout as at
-from tiengine.model.model import Model
+from tiengine.model.implicit_seats import seat_shapes
+from tiengine.model.model import Ingredients
 from tiengine.parameters.arrays import Reals
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
@@ -24,7 +25,7 @@ class SlotExtremes:
     """Running extremes by slot (see :mod:`tiengine.engine.state`); slabs that leave are reduced and put aside.
 
     Attributes:
-        largest, smallest: Of the slab in each slot, shape (B, slots, points).
+        largest, smallest: Extremes of the slab in each slot, shape (B, slots, points).
         starts: First point of each quantity; a quantity's points are reduced to one when a slab leaves.
         first_slab: Rear slab, -1 before the first sample.
     """
@@ -37,12 +38,12 @@ class SlotExtremes:
 
     @classmethod
     def of(cls, trains: int, slots: int, points: int, starts: tuple[int, ...] = (0,)) -> SlotExtremes:
-        """Nothing seen yet."""
+        """Extremes before the first sample."""
         shape = (trains, slots, points)
         return cls(np.full(shape, -np.inf), np.full(shape, np.inf), starts)
 
     def move(self, first_slab: int) -> None:
-        """Put aside the slabs behind a new rear slab; their slots begin anew."""
+        """Put aside the slabs behind a new rear slab; their slots start again."""
         if first_slab == self.first_slab:
             return
         slots = self.largest.shape[1]
@@ -54,7 +55,7 @@ class SlotExtremes:
         self.first_slab = first_slab
 
     def add(self, largest: NDArray[np.float64], smallest: NDArray[np.float64]) -> None:
-        """Take in what was seen.
+        """Take in new values.
 
         Args:
             largest: Largest values of the slabs in all slots since the last call, shape (B, slots, points).
@@ -70,17 +71,17 @@ class SlotExtremes:
         largest, smallest = np.concatenate([none, *(extremes[:, :, None] for _, extremes in left)], axis=2)
         return np.array([slab for slab, _ in left], dtype=np.int64), largest, smallest
 
-    def leave(self) -> None:
+    def put_aside_all(self) -> None:
         """Put aside all slabs."""
         if self.first_slab >= 0:
             self.move(self.first_slab + self.largest.shape[1])
 
     def saved(self) -> dict[str, NDArray[np.float64]]:
-        """What the coming slabs depend on, when nothing is put aside."""
+        """Values that the coming slabs depend on, when nothing is put aside."""
         return {"largest": self.largest, "smallest": self.smallest, "first": np.array(float(self.first_slab))}
 
     def restore(self, saved: Mapping[str, NDArray[np.float64]]) -> None:
-        """Go on from what :meth:`saved` gave."""
+        """Continue from the values of :meth:`saved`."""
         self.largest[:], self.smallest[:] = saved["largest"], saved["smallest"]
         self.first_slab = int(saved["first"])
 
@@ -90,7 +91,7 @@ class SlabEnvelopes:
     """Extremes of every slab over the bodies' samples.
 
     Attributes:
-        stepper: What is watched.
+        stepper: Is watched.
         void: Smallest factor of the voids under each slab that has one.
         shape: Deflection at the nodes and under the seats, moments at the points of :mod:`tiengine.track.slab_moments`.
         pressure: Of the mortar; it lags behind, as pressures come at the end of a chunk.
@@ -103,36 +104,36 @@ class SlabEnvelopes:
 
     def __post_init__(self) -> None:
         """Buffers of a sample."""
-        slabs = self.stepper.state.view(at.U, "slabs")
-        self._operator, _ = _measures(self.stepper.model)
-        self._motion = slabs.reshape(-1, slabs.shape[-1])
-        self._felt = np.empty(self.shape.largest.shape)
+        self._operator, _ = _measures(self.stepper.ingredients)
+        self._values = np.empty(self.shape.largest.shape)
         self._first: list[int] = []
 
     @classmethod
     def of(cls, scenario: Scenario, stepper: Stepper) -> SlabEnvelopes:
-        """Nothing seen yet."""
+        """Extremes before the first sample."""
         void: dict[int, float] = {}
         for each in scenario.track.mortar_voids:
             void[each.slab] = min(each.factor, void.get(each.slab, each.factor))
-        operator, starts = _measures(stepper.model)
-        trains, slots = stepper.state.design.shape
+        operator, starts = _measures(stepper.ingredients)
+        trains, slots = stepper.state.trains, stepper.state.slots
         shape = SlotExtremes.of(trains, slots, operator.shape[1], starts)
         return cls(stepper, void, shape, SlotExtremes.of(trains, slots, 1))
 
     @property
     def stage(self) -> str:
-        """What its part of a step is called."""
+        """Name of its stage of the step."""
         return "envelopes"
 
     def watch(self) -> None:
-        """Take in the slabs' shape if the step is one that the bodies are asked for."""
-        if self.stepper.asked[2] < 0:
+        """Take in the slabs' shape if the step records the bodies."""
+        if self.stepper.rows.body < 0:
             return
-        first = self.stepper.state.first_slab
+        state = self.stepper.state
+        first, motion = state.first_slab, state.slab_motion(DISPLACEMENT)
         self.shape.move(first)
-        np.dot(self._motion, self._operator, self._felt.reshape(len(self._motion), -1))
-        self.shape.add(self._felt, self._felt)
+        slabs = motion.reshape(-1, motion.shape[-1])
+        np.dot(slabs, self._operator, self._values.reshape(len(slabs), -1))
+        self.shape.add(self._values, self._values)
         self._first.append(first)
 
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
@@ -145,25 +146,25 @@ class SlabEnvelopes:
             self.pressure.add(mortar[:, rows, :, :1].max(axis=1), mortar[:, rows, :, 1:].min(axis=1))
         return self._taken()
 
-    def rest(self) -> list[Block]:
+    def remainder(self) -> list[Block]:
         """Slabs still in memory."""
-        self.shape.leave()
-        self.pressure.leave()
+        self.shape.put_aside_all()
+        self.pressure.put_aside_all()
         return self._taken()
 
     def saved(self) -> dict[str, Reals]:
-        """What the coming slabs depend on, when nothing is put aside."""
+        """Values that the coming slabs depend on, when nothing is put aside."""
         rows = {"shape": self.shape.saved(), "pressure": self.pressure.saved()}
         return {f"{part}_{key}": value for part, saved in rows.items() for key, value in saved.items()}
 
     def restore(self, saved: Mapping[str, Reals]) -> None:
-        """Go on from what :meth:`saved` gave."""
+        """Continue from the values of :meth:`saved`."""
         for part, extremes in (("shape_", self.shape), ("pressure_", self.pressure)):
             extremes.restore({key.removeprefix(part): saved[key] for key in saved if key.startswith(part)})
 
     def _taken(self) -> list[Block]:
-        """What was put aside."""
-        slab = self.stepper.model.given.slab
+        """Slabs that were put aside since the last call."""
+        slab = self.stepper.ingredients.slab
         slabs, largest, smallest = self.shape.take()
         _, *pressure = self.pressure.take()
         names = ("pressure", "deflection", "moment_x", "moment_y")
@@ -183,14 +184,14 @@ class SlabEnvelopes:
         ]
 
 
-def _measures(model: Model) -> tuple[Reals, tuple[int, int, int]]:
+def _measures(ingredients: Ingredients) -> tuple[Reals, tuple[int, int, int]]:
     """Slab coordinates to deflection, M_x, M_y, shape (dofs, points), and the first point of each.
 
     The deflection is taken at the nodes and under the fastenings: of a coarse mesh no node may be near these.
     """
-    slab, seats = model.given.slab, 2 * model.given.slab.fastenings
+    slab, seats = ingredients.slab, 2 * ingredients.slab.fastenings
     moments = moment_operator(slab)
     nodes = np.eye(len(moments))[:, : slab.plate_dofs : 3]
-    places = np.hstack([nodes, model.slab_seats[:, :seats]])
+    places = np.hstack([nodes, seat_shapes(ingredients.designs.matrices[0])[:, :seats]])
     n, points = places.shape[1], moments.shape[2]
     return np.hstack([places, moments[:, 0], moments[:, 1]]), (0, n, n + points)

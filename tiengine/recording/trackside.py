@@ -1,8 +1,8 @@
-"""What the track feels, beside what the train does: envelopes of seats and slabs, gauges, the deflected track.
+"""Records of the track: envelopes of seats and slabs, gauges, snapshots of the deflection.
 
-Watchers look at the state at the end of every step. With each chunk of steps they give out what is complete, so that
-nothing grows with the length of the way; what they hold besides are plain arrays, which :meth:`Trackside.saved` gives
-and :meth:`Trackside.restore` takes.
+Watchers read the state at the end of every step. With each chunk of steps they hand over what is complete, so that
+memory does not grow with distance; what they keep are plain arrays, which :meth:`Trackside.saved` returns and
+:meth:`Trackside.restore` takes.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from tiengine.engine.stepper import Stepper
-from tiengine.kernels import layout as at
 from tiengine.parameters.arrays import Reals
 from tiengine.recording.deflection import Deflection
 from tiengine.recording.gauge_samples import gauge_samples
 from tiengine.recording.seat_envelopes import SeatEnvelopes
 from tiengine.recording.slab_envelopes import SlabEnvelopes
-from tiengine.result_files.channels import DEFLECTION, GAUGE_FORCE, GAUGE_MOTION, SEATS, SLABS
+from tiengine.result_files.channels import DEFLECTION, SEATS, SLABS
 from tiengine.result_files.layout import DTYPES, Block, GroupSpec
 from tiengine.scenario.gauges import Gauge, nearest_seat
 from tiengine.scenario.scenario import Scenario
@@ -30,31 +29,31 @@ __all__ = ["Trackside", "Watcher", "trackside_groups"]
 
 
 class Watcher(Protocol):
-    """One who looks at every step and fills a group of the file."""
+    """Reads the state at every step and fills a group of the file."""
 
     @property
     def stage(self) -> str:
-        """What its part of a step is called."""
+        """Name of its stage of the step."""
 
     def watch(self) -> None:
-        """Look at the state at the end of a step."""
+        """Read the state at the end of a step."""
 
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
-        """What is complete, train by train.
+        """Hand over what is complete, train by train.
 
         Args:
             time: Ends of the chunk's steps [s], shape (steps,).
             position: Chainage of the first vehicle's centre then [m].
         """
 
-    def rest(self) -> list[Block]:
-        """What is kept back until the end of the run, train by train; empty if nothing is."""
+    def remainder(self) -> list[Block]:
+        """Hand over what is kept until the end of the run, train by train; empty if nothing is."""
 
     def saved(self) -> dict[str, Reals]:
-        """All that it holds between chunks; arrays of its own, not copies."""
+        """All arrays that it holds between chunks, not copies."""
 
     def restore(self, saved: Mapping[str, Reals]) -> None:
-        """Go on from there."""
+        """Continue from the values of :meth:`saved`."""
 
 
 @dataclass(eq=False)
@@ -62,9 +61,9 @@ class Trackside:
     """The watchers of a run.
 
     Attributes:
-        watchers: By the group that they fill.
+        watchers: Watchers by the group that they fill.
         point_offset: Points of the group ``deflection`` forward of the first vehicle's centre [m].
-        trains: B.
+        trains: Trains advanced together, B.
         dtype: Precision of the file.
     """
 
@@ -74,27 +73,28 @@ class Trackside:
     dtype: Any
 
     @classmethod
-    def beside(cls, scenario: Scenario, stepper: Stepper) -> Trackside:
-        """What a scenario asks for; each watcher becomes a last stage of the stepper.
+    def watching(cls, scenario: Scenario, stepper: Stepper) -> Trackside:
+        """Watchers of the groups that a scenario records, called by the stepper after each step.
 
         Args:
-            scenario: Says what is recorded.
+            scenario: Selects the groups that are recorded.
             stepper: Is watched.
         """
         watchers = dict(_watchers(scenario, stepper))
-        stepper.stages = (*stepper.stages, *((watcher.stage, watcher.watch) for watcher in watchers.values()))
+        for watcher in watchers.values():
+            stepper.watch(watcher.stage, watcher.watch)
         snapshots = watchers.get("deflection")
         offset = snapshots.point_offset if isinstance(snapshots, Deflection) else np.zeros(0)
-        return cls(watchers, offset, int(stepper.model.dims[at.TRAINS]), DTYPES[scenario.output.precision])
+        return cls(watchers, offset, stepper.state.trains, DTYPES[scenario.output.precision])
 
     def blocks(self, time: Reals, position: Reals, failed: Container[int] = ()) -> list[dict[str, Block]]:
-        """What a chunk of steps has to write, train by train; arrays of its own.
+        """Blocks to be written after a chunk of steps, train by train; the arrays are copies.
 
         Args:
             time: Ends of the steps [s], shape (steps,).
             position: Chainage of the first vehicle's centre then [m].
-            failed: Places of the trains that failed in these steps. Their seats and slabs, watched beyond the end, are
-                left out.
+            failed: Places of the trains that failed in these steps. Their seats and slabs, watched beyond that instant,
+                are left out.
         """
         found: list[dict[str, Block]] = [{} for _ in range(self.trains)]
         for group, watcher in self.watchers.items():
@@ -103,34 +103,34 @@ class Trackside:
                     found[b][group] = self._cast(block)
         return found
 
-    def rest(self) -> list[dict[str, Block]]:
-        """What is left to write at the end of the run, train by train."""
+    def remainder(self) -> list[dict[str, Block]]:
+        """Blocks to be written at the end of the run, train by train."""
         found: list[dict[str, Block]] = [{} for _ in range(self.trains)]
         for group, watcher in self.watchers.items():
-            for b, block in enumerate(watcher.rest()):
+            for b, block in enumerate(watcher.remainder()):
                 found[b][group] = self._cast(block)
         return found
 
     def saved(self) -> dict[str, Reals]:
-        """All that the rest of the run depends on, between two chunks."""
+        """Arrays that the coming steps depend on, between two chunks."""
         return {f"{group}.{key}": value for group, each in self.watchers.items() for key, value in each.saved().items()}
 
     def restore(self, saved: Mapping[str, Reals]) -> None:
-        """Go on from what :meth:`saved` gave, in a run of the same scenario."""
+        """Continue from the values of :meth:`saved`, in a run of the same scenario."""
         for group, watcher in self.watchers.items():
             own = f"{group}."
             watcher.restore({key.removeprefix(own): value for key, value in saved.items() if key.startswith(own)})
 
     def _cast(self, block: Block) -> Block:
         channels = {name: np.array(value, self.dtype) for name, value in block.channels.items()}
-        return Block(block.along, block.place, channels)
+        return Block(block.along, block.chainage, channels)
 
 
 ENVELOPES = {"seats": SEATS, "slabs": SLABS}
 
 
 def trackside_groups(scenario: Scenario) -> dict[str, GroupSpec]:
-    """Groups of the file that a scenario asks for, in the order of the watchers."""
+    """Groups of the file that a scenario records of the track, in the order of the watchers."""
     out = scenario.output
     groups: dict[str, GroupSpec] = {}
     if out.envelopes:
@@ -147,13 +147,13 @@ def _gauge_group(gauge: Gauge, slab: Slab) -> GroupSpec:
     if gauge.on == "fastening":
         seat = nearest_seat(gauge.chainage, slab)
         known = {"on": gauge.on, "chainage": (seat + 0.5) * slab.fastening_pitch, "seat": seat, "side": gauge.side}
-        return GroupSpec((), GAUGE_FORCE, attributes=known)
+        return GroupSpec.gauge("force", known)
     where = {"side": gauge.side} if gauge.on == "rail" else {"y": gauge.y}
-    return GroupSpec(("direction",), GAUGE_MOTION, attributes={"on": gauge.on, "chainage": gauge.chainage, **where})
+    return GroupSpec.gauge("motion", {"on": gauge.on, "chainage": gauge.chainage, **where})
 
 
 def _watchers(scenario: Scenario, stepper: Stepper) -> Iterator[tuple[str, Watcher]]:
-    """Who fills the groups."""
+    """Watchers by the group that they fill."""
     out = scenario.output
     if out.envelopes:
         yield "seats", SeatEnvelopes.of(stepper)
@@ -161,5 +161,5 @@ def _watchers(scenario: Scenario, stepper: Stepper) -> Iterator[tuple[str, Watch
     for gauge in scenario.gauges:
         yield f"gauges/{gauge.name}", gauge_samples(gauge, stepper)
     if out.deflection_interval != "none":
-        every = max(1, round(float(out.deflection_interval) / stepper.model.given.newmark.dt))
+        every = max(1, round(float(out.deflection_interval) / stepper.ingredients.newmark.dt))
         yield "deflection", Deflection(stepper, every)

@@ -11,7 +11,8 @@ from tiengine.scenario.ensemble import Ensemble
 
 if TYPE_CHECKING:
     from tiengine.scenario.scenario import Scenario
-    from tiengine.track.defects import FailedFastenings, MortarDefect
+    from tiengine.track.defects import FailedFastenings
+    from tiengine.track.mortar import MortarVoid
 
 __all__ = ["scenario_words"]
 
@@ -70,6 +71,8 @@ def _irregularity(scenario: Scenario) -> str:
     track = scenario.irregularity
     if track.file is not None:
         words = f"measured, {Path(track.file).name}"
+    elif track.function is not None:
+        words = f"given by the Python function {track.function}"
     elif track.spectrum == "none":
         words = "none, a smooth track"
     else:
@@ -99,7 +102,7 @@ def _fastenings(row: FailedFastenings, pitch: float) -> str:
     return f"{count} {'fastening' if count == 1 else 'fastenings'} of {rails} {state} ({where}, chainage {span})"
 
 
-def _void(void: MortarDefect) -> str:
+def _void(void: MortarVoid) -> str:
     state = "no mortar" if void.factor == 0.0 else f"mortar at {100.0 * void.factor:g} % of its stiffness"
     area = (void.x[1] - void.x[0]) * (void.y[1] - void.y[0])
     return f"{state} under {area:.2g} m² of slab {void.slab} (from its rear edge {void.x[0]:g} to {void.x[1]:g} m)"

@@ -1,1 +1,5 @@
-"""Scenarios: everything that a user can state about a run, checked."""
+"""Scenarios: validated description of a run."""
+
+from tiengine.scenario.scenario import Scenario, load_scenario
+
+__all__ = ["Scenario", "load_scenario"]

@@ -1,4 +1,4 @@
-"""Settings of the contact table that a scenario asks for."""
+"""Contact-table settings of a scenario."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tiengine.vehicle.train import TrainModel
 
 
 def contact_settings(scenario: Scenario, train: TrainModel) -> ContactSettings:
-    """How the scenario places its wheels on its rails, and what they are made of; one kind of wheel in a train.
+    """Placement and material of wheels and rails; all wheels of a train share one contact table.
 
     Raises:
         InputError: Vehicles whose wheels differ.

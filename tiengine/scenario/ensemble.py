@@ -1,17 +1,16 @@
-"""Many trains from one scenario: how they differ.
+"""Ensemble: several trains from one scenario, and the keys in which they differ.
 
 ::
 
     [ensemble]
     size = 4
-    seeds = [11, 12, 13, 14]              # default: irregularity.seed and those that follow it
+    seeds = [11, 12, 13, 14]              # default: irregularity.seed and the seeds that follow
 
     [ensemble.vary]
     "train.speed_kmh" = [300.0, 350.0]    # trains 0 and 2 run at 300 km/h, trains 1 and 3 at 350 km/h
 
-Train i takes entry i of every list; a list shorter than the ensemble, of a length that divides its size, is repeated
-in turn. Any key may vary that describes a train, its track or its numerics. What all trains of a file share may not:
-the output, and the threads of the process that computes them.
+Train i takes entry i of every list; a list whose length divides the ensemble's size is repeated. Any key that describes
+a train, its track or its numerics may vary. Settings shared by all trains of a file may not: output and threads.
 """
 
 from __future__ import annotations
@@ -31,39 +30,40 @@ VARIABLE = ("train", "track", "irregularity", "contact", "numerics")
 SHARED = ("numerics.threads",)
 
 MOST_DIFFERENT = 5000
-"""Trains of one ensemble that differ in more than their seed: each takes some 10 ms to build and check."""
+"""Trains of one ensemble that differ in more than their seed: each takes about 10 ms to build and check."""
 
-Seed = Annotated[int, Q("-", "names a realisation", ge=0, le=2**63 - 1)]
+Seed = Annotated[int, Q("-", "seed of a realisation", ge=0, le=2**63 - 1)]
 
 
 def _flat(value: Any) -> Any:
-    """Lists by dotted key: ``{train = {speed_kmh = [...]}}`` means ``{"train.speed_kmh" = [...]}``."""
+    """Flatten to dotted keys: ``{train = {speed_kmh = [...]}}`` means ``{"train.speed_kmh" = [...]}``."""
     return dict(_leaves(value, "")) if isinstance(value, dict) else value
 
 
 def _leaves(tables: dict[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+    """Dotted keys and lists of nested tables."""
     for key, value in tables.items():
         if isinstance(value, dict):
             yield from _leaves(value, f"{prefix}{key}.")
         elif not isinstance(value, tuple):
-            raise InputError(f"ensemble.vary: {prefix + key!r} = {value!r}: must be a list, one value a train")
+            raise InputError(f"ensemble.vary: {prefix + key!r} = {value!r}: must be a list, one value per train")
         else:
             yield f"{prefix}{key}", value
 
 
 class Ensemble(Params):
-    """Trains that are run together: how many, and the keys of the scenario that differ between them.
+    """Number of trains that are run together, and the keys of the scenario that differ between them.
 
     Without ``seeds``, trains take ``irregularity.seed`` and the seeds that follow it. ``vary`` holds a list of values
     for each key that varies.
     """
 
-    size: Annotated[int, Q("-", "trains", ge=1, le=100_000)] = 1
-    seeds: Annotated[tuple[Seed, ...], Field(description="one a train")] = ()
+    size: Annotated[int, Q("-", "number of trains", ge=1, le=100_000)] = 1
+    seeds: Annotated[tuple[Seed, ...], Field(description="one per train")] = ()
     vary: Annotated[
         dict[str, tuple[Any, ...]],
         BeforeValidator(_flat),
-        Field(description="lists of values by key; train i takes entry i, shorter lists are repeated in turn"),
+        Field(description="lists of values by key; train i takes entry i, shorter lists are repeated"),
     ] = Field(default_factory=dict)
 
     @field_validator("seeds")
@@ -71,7 +71,7 @@ class Ensemble(Params):
     def _has_one_a_train(cls, seeds: tuple[int, ...], info: ValidationInfo) -> tuple[int, ...]:
         size = info.data.get("size", len(seeds))
         if seeds and len(seeds) != size:
-            raise ValueError(f"must be one seed a train, {size}")
+            raise ValueError(f"must be one seed per train, {size}")
         return seeds
 
     @field_validator("vary")
@@ -87,22 +87,22 @@ class Ensemble(Params):
             if not entries or size % len(entries):
                 raise InputError(
                     f"ensemble.vary: {key!r} has {len(entries)} values: must be as many as trains, {size},"
-                    " or a number that divides it"
+                    " or a divisor of it"
                 )
         different = math.lcm(*map(len, vary.values()))
         if different > MOST_DIFFERENT:
             raise InputError(f"ensemble.vary: {different} different trains: must be at most {MOST_DIFFERENT}")
         if "irregularity.seed" in vary and info.data.get("seeds"):
-            raise InputError("ensemble.vary: 'irregularity.seed' cannot vary where ensemble.seeds is given")
+            raise InputError("ensemble.vary: 'irregularity.seed' cannot vary if ensemble.seeds is stated")
         return vary
 
     @property
     def different(self) -> int:
-        """Trains, from the first on, after which the values that vary begin again."""
+        """Number of trains after which the varied values repeat."""
         return math.lcm(*map(len, self.vary.values()))
 
     def changes(self, train: int) -> dict[str, Any]:
-        """Values of the keys that vary, of one train.
+        """Varied keys and their values for one train.
 
         Args:
             train: Its number, from 0.
@@ -110,7 +110,7 @@ class Ensemble(Params):
         return {key: entries[train % len(entries)] for key, entries in self.vary.items()}
 
     def seed(self, train: int, first: int) -> int:
-        """Seed of one train, where no key varies it.
+        """Seed of one train, unless ``vary`` sets it.
 
         Args:
             train: Its number, from 0.

@@ -1,4 +1,4 @@
-"""What ends a train and what is only recorded."""
+"""Policy for events: which end a train and which are only recorded."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ Policy = Literal["stop", "record"]
 
 
 class Events(Params):
-    """What ends a train ("stop") and what is only written down ("record").
+    """Events that end a train ("stop") or are only recorded ("record").
 
     Attributes:
-        derailment: A wheel is beyond its profile on the flange side, where forces mean nothing any more.
+        derailment: A wheel has left the contact table on the flange side; forces are no longer valid.
         flange_climb: The contact has passed the steepest part of the flange.
-        wheel_lift: A wheel carries nothing for ``wheel_lift_time``.
-        track_end: The leading wheel comes to the end of a measured track, smooth beyond it.
+        wheel_lift: A wheel is unloaded for ``wheel_lift_time``.
+        track_end: The leading wheel reaches the end of a measured track; the track is smooth beyond it.
     """
 
     derailment: Policy = "stop"
     flange_climb: Policy = "record"
     wheel_lift: Policy = "record"
     track_end: Policy = "record"
-    wheel_lift_time: Annotated[float, Q("s", "how long a wheel must be off its rail", ge=1e-3, le=10.0)] = 0.05
+    wheel_lift_time: Annotated[float, Q("s", "time a wheel must be off its rail", ge=1e-3, le=10.0)] = 0.05

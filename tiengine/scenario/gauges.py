@@ -1,4 +1,4 @@
-"""Gauges of a scenario: fixed places of rail, slab or fastening that a run watches while the window is over them.
+"""Gauges of a scenario: fixed points of rail, slab or fastening, recorded while the window is over them.
 
 ::
 
@@ -6,7 +6,7 @@
     name = "left_rail"
     on = "rail"
     chainage = 101.4        # m
-    side = "left"           # rail and fastening; a slab has y instead, from the centre line to the right [m]
+    side = "left"           # rail and fastening; a slab has y instead, distance right of the centre line [m]
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 
 class Gauge(Params):
-    """One place. On a fastening it is that of the seat nearest to the chainage.
+    """One measuring point; on a fastening it is moved to the seat nearest to the chainage.
 
     Attributes:
         name: Its group in the result is gauges/NAME; letters, digits, _ and -.
-        on: What it watches.
-        chainage: Where it stands; on a slab not in a joint.
-        side: Of rail and fastening.
-        y: Of a slab, from the centre line, positive to the right.
+        on: Measured part.
+        chainage: Position along the track; on a slab, not in a joint.
+        side: Side of the rail or fastening.
+        y: Position on a slab, from the centre line, positive to the right.
     """
 
     name: Annotated[str, Field(max_length=100)]
@@ -58,19 +58,19 @@ def nearest_seat(chainage: float, slab: Slab) -> int:
 
 
 def slab_under(chainage: float, slab: Slab) -> tuple[int, float]:
-    """Index of the slab over which a chainage lies, and the place from its centre [m], beyond its ends in a joint."""
+    """Index of the slab at a chainage [m], and the distance from its centre [m], beyond its ends in a joint."""
     index = int(np.floor(chainage / slab.pitch))
     return index, chainage - (index + 0.5) * slab.pitch
 
 
 def check_gauges(gauges: Sequence[Gauge], *, begin: float, end: float, slab: Slab) -> None:
-    """Refuse gauges that the run never meets, that stand nowhere, or that share a name.
+    """Refuse gauges that the run never reaches, that lie off the slab, or that share a name.
 
     Args:
-        gauges: Of the scenario.
+        gauges: Gauges of the scenario.
         begin: Chainage of the window's rear end at the start of the run [m].
         end: Chainage of its front end at the end of the run [m].
-        slab: Gives the pitches of seats and slabs and a slab's size.
+        slab: Pitches of seats and slabs and size of a slab.
 
     Raises:
         InputError: Names the entry, its value and the rule.
@@ -79,25 +79,26 @@ def check_gauges(gauges: Sequence[Gauge], *, begin: float, end: float, slab: Sla
     for i, gauge in enumerate(gauges):
         where = f"gauges[{i}]"
         if gauge.name in names[:i]:
-            raise InputError(f"{where}.name = {gauge.name!r}: gauges[{names.index(gauge.name)}] has this name already")
+            raise InputError(f"{where}.name = {gauge.name!r}: gauges[{names.index(gauge.name)}] already has this name")
         if not begin <= gauge.chainage <= end:
             raise InputError(
-                f"{where}.chainage = {gauge.chainage:g}: must be between {begin:g} and {end:g} m, where the window goes"
+                f"{where}.chainage = {gauge.chainage:g}: must be between {begin:g} and {end:g} m,"
+                " the range covered by the window"
             )
         if gauge.on == "slab":
             _check_slab_gauge(where, gauge, slab)
         elif gauge.side is None:
             raise InputError(f"{where}.side: missing; a gauge on a {gauge.on} needs 'left' or 'right'")
         elif gauge.y is not None:
-            raise InputError(f"{where}.y = {gauge.y:g}: only a gauge on a slab has it")
+            raise InputError(f"{where}.y = {gauge.y:g}: only for a gauge on a slab")
 
 
 def _check_slab_gauge(where: str, gauge: Gauge, slab: Slab) -> None:
-    """Rules of a gauge on a slab."""
+    """Check the rules of a gauge on a slab."""
     if gauge.side is not None:
         raise InputError(f"{where}.side = {gauge.side!r}: a gauge on a slab has y instead")
     if gauge.y is None:
-        raise InputError(f"{where}.y: missing; a gauge on a slab needs its place from the centre line in m")
+        raise InputError(f"{where}.y: missing; a gauge on a slab needs its distance from the centre line in m")
     if abs(gauge.y) > slab.width / 2.0:
         raise InputError(f"{where}.y = {gauge.y:g}: must be within half the slab's width, {slab.width / 2.0:g} m")
     index, x = slab_under(gauge.chainage, slab)
@@ -105,5 +106,5 @@ def _check_slab_gauge(where: str, gauge: Gauge, slab: Slab) -> None:
         ends = [(index + 0.5) * slab.pitch + half * slab.length for half in (-0.5, 0.5)]
         raise InputError(
             f"{where}.chainage = {gauge.chainage:g}: lies in a joint; must be on a slab,"
-            f" number {index} goes from {ends[0]:g} to {ends[1]:g} m"
+            f" number {index} extends from {ends[0]:g} to {ends[1]:g} m"
         )

@@ -1,4 +1,4 @@
-"""Checks of single keys of a scenario that a range cannot say."""
+"""Checks of single keys of a scenario beyond a numeric range."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ __all__ = ["NumberOr", "channel_names", "check_speed", "number_or"]
 
 
 def _finite(value: Any) -> bool:
+    """Whether a value is a finite number."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return is_number and -math.inf < value < math.inf  # a whole number may be too large for a float
 
 
 @dataclass(frozen=True)
 class NumberOr(BeforeValidator):
-    """Check of a key that is one word or a number within a range, and its words for the manual.
+    """Check of a key that is one word or a number within a range, described for the manual.
 
     Attributes:
         word: The word.
@@ -35,7 +36,7 @@ class NumberOr(BeforeValidator):
 
 
 def number_or(word: str, unit: str, low: float, high: float) -> NumberOr:
-    """Either one word or a number in ``low .. high``."""
+    """Make a check for one word or a number in ``low .. high``."""
 
     def check(value: Any) -> Any:
         if value == word:
@@ -48,7 +49,7 @@ def number_or(word: str, unit: str, low: float, high: float) -> NumberOr:
 
 
 def check_speed(value: Any) -> Any:
-    """A speed, or rows of chainage and speed."""
+    """Check a speed, or rows of chainage and speed."""
     if isinstance(value, tuple):
         if len(value) < 2 or not all(isinstance(r, tuple) and len(r) == 2 and all(map(_finite, r)) for r in value):
             raise ValueError("must be a number or two or more rows [chainage_m, km/h]")
@@ -65,7 +66,7 @@ def check_speed(value: Any) -> Any:
 
 
 def channel_names(known: dict[str, Any]) -> BeforeValidator:
-    """Either "all" or names out of the known channels."""
+    """Make a check for "all" or a list of known channels."""
 
     def check(value: Any) -> Any:
         if value == "all":

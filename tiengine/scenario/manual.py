@@ -1,7 +1,6 @@
-"""What the manual has from declarations: the page on the keys of a scenario, the tables of channels.
+"""Reference pages generated from declarations: the keys of a scenario, the channels of a result.
 
-``python -m tiengine.scenario.manual docs`` brings docs/scenario.md and docs/results.md up to date; a test holds them
-to it.
+``python -m tiengine.scenario.manual docs`` updates docs/scenario.md and docs/results.md; a test compares them.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION, GROUPS
-from tiengine.result_files.layout import GroupSpec
+from tiengine.result_files.layout import DIMENSIONS, GAUGE_DIMENSIONS
 from tiengine.scenario.key_checks import NumberOr
 from tiengine.scenario.parts import ProfilePoints
 from tiengine.scenario.scenario import Scenario
@@ -37,16 +36,15 @@ HEAD = """# Scenario reference
 
 A scenario is a TOML file. Unknown keys are refused, and every value is checked before a run begins. `--set key=value`
 changes one on the command line (`--set train.speed_kmh=300`), a dictionary in Python
-(`load_scenario("paper", {"train.speed_kmh": 300.0})`). All tables but `[train]` may be left out. `tiengine list` shows
-the presets and where their numbers come from; the resolved scenario, with everything that was used, stands in each
-result file.
+(`load_scenario("paper", {"train.speed_kmh": 300.0})`). All tables but `[train]` are optional. `tiengine list` shows
+the presets and their sources; each result file contains the resolved scenario with all values used.
 
-This page is made from the declarations in the code (`python -m tiengine.scenario.manual docs`).
+This page is generated from the declarations in the code (`python -m tiengine.scenario.manual docs`).
 """
 
 PARTS = """## Parts
 
-A part is given by the name of a preset, by the path of a file relative to the scenario's, or as a table, which may
+A part is stated by the name of a preset, by the path of a file relative to the scenario's, or as a table, which may
 start from a preset:
 
 ```toml
@@ -55,8 +53,8 @@ like = "ACE2021"
 vertical_stiffness = 5e7
 ```
 
-Presets of a scenario's own stand under `[presets.KIND.NAME]`, with the kinds that `tiengine list` names. A profile may
-also be a file of SIMPACK or MiniProf, see [files](files.md).
+A scenario's own presets are tables `[presets.KIND.NAME]`, with the kinds that `tiengine list` names. A profile may
+also be a SIMPACK or MiniProf file, see [files](files.md).
 """
 
 TYPES: dict[Any, str] = {float: "number", int: "whole number", str: "text", bool: "true or false"}
@@ -66,12 +64,12 @@ ROLE = re.compile(r":\w+:`~?\.?([^`]*)`")
 
 @dataclass
 class Table:
-    """One class of parameters and where it stands in a file.
+    """One class of parameters and its places in a scenario file.
 
     Attributes:
         model: The class.
-        places: Heads of its tables.
-        level: Of its heading.
+        places: Headings of its tables.
+        level: Level of its heading.
     """
 
     model: type[BaseModel]
@@ -80,14 +78,14 @@ class Table:
 
 
 def page() -> str:
-    """The whole page as Markdown."""
+    """Scenario reference as Markdown."""
     scenario, parts = tables()
     blocks = [HEAD, *map(_section, scenario), PARTS, *map(_section, parts)]
     return "\n".join(blocks)
 
 
 def tables() -> tuple[list[Table], list[Table]]:
-    """The tables of a scenario, and those of its parts."""
+    """Tables of a scenario, and tables of its parts."""
     scenario = list(_walk(Scenario, ""))
     scenario[0].places = ["top of the file"]
     parts: list[Table] = []
@@ -107,7 +105,7 @@ def tables() -> tuple[list[Table], list[Table]]:
 
 
 def _walk(model: type[BaseModel], prefix: str, level: int = 2) -> Iterator[Table]:
-    """A class and, each once, those of the tables in it."""
+    """A class and the classes of its tables, each once."""
     yield Table(model, level=level)
     inner: dict[type[BaseModel], Table] = {}
     for key, info in model.model_fields.items():
@@ -122,7 +120,7 @@ def _walk(model: type[BaseModel], prefix: str, level: int = 2) -> Iterator[Table
 
 
 def _section(table: Table) -> str:
-    """Heading, words and keys of one table."""
+    """Heading, description and keys of one table."""
     places = table.places[0] if len(table.places) == 1 else f"{', '.join(table.places[:-1])} and {table.places[-1]}"
     lines = [f"{'#' * table.level} {places[0].upper()}{places[1:]}", "", _words(table.model), ""]
     lines += ["| key | type | unit | range | default | meaning |", "| --- | --- | --- | --- | --- | --- |"]
@@ -142,7 +140,7 @@ def _section(table: Table) -> str:
 
 
 def _type(annotation: Any) -> str:
-    """A type in words."""
+    """Description of a type."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _type(arguments[0])
@@ -187,7 +185,7 @@ def _range(info: FieldInfo | None) -> str:
 
 
 def _number(value: Any) -> str:
-    """As it may stand in TOML."""
+    """Format a number as in TOML."""
     if isinstance(value, int):
         return str(value)
     return re.sub(r"e([+-])0*", lambda match: f"e{match[1].strip('+')}", f"{value:g}")
@@ -198,7 +196,7 @@ def _numbers(info: FieldInfo) -> list[NumberOr]:
 
 
 def _default(info: FieldInfo) -> str:
-    """Default value as it stands in TOML."""
+    """Format a default value as in TOML."""
     if info.is_required():
         return "required"
     value = info.get_default(call_default_factory=True)
@@ -221,7 +219,7 @@ def _words(model: type[BaseModel]) -> str:
 
 
 def _attributes(model: type[BaseModel]) -> dict[str, str]:
-    """What docstrings of a class and its parents say of each attribute."""
+    """Descriptions of attributes from the docstrings of a class and its parents."""
     found: dict[str, str] = {}
     for parent in reversed(model.__mro__):
         _, _, text = inspect.cleandoc(parent.__doc__ or "").partition("Attributes:\n")
@@ -233,7 +231,7 @@ def _attributes(model: type[BaseModel]) -> dict[str, str]:
 
 
 def _table_words(info: FieldInfo) -> str:
-    """First sentence of the table that a key holds."""
+    """Description of a key that holds a table, empty for other keys."""
     model, many = _model_of(info.annotation)
     if model is None:
         return ""
@@ -241,7 +239,7 @@ def _table_words(info: FieldInfo) -> str:
 
 
 def _model_of(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
-    """Class of the tables that a key holds, if any, and whether there may be several."""
+    """Class of the tables of a key, if any, and whether there may be several."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation, False
     for argument in get_args(annotation):
@@ -252,7 +250,7 @@ def _model_of(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
 
 
 def _inner(annotation: Any) -> FieldInfo | None:
-    """Declaration of the entries of a list, or of a value that may be left out."""
+    """Declaration of the entries of a list, or of an optional value."""
     for argument in get_args(annotation):
         marks = getattr(argument, "__metadata__", ())
         for mark in marks:
@@ -262,11 +260,10 @@ def _inner(annotation: Any) -> FieldInfo | None:
 
 
 def channel_tables() -> str:
-    """Channels of every group of a result as Markdown."""
-    specs = {name: GroupSpec.standard(name, tuple(channels)) for name, channels in GROUPS.items()}
-    groups = [(name, (spec.axis.name, *spec.dimensions), spec.channels) for name, spec in specs.items()]
-    groups.append(("gauges/NAME, on rail or slab", ("time", "direction"), GAUGE_MOTION))
-    groups.append(("gauges/NAME, on a fastening", ("time",), GAUGE_FORCE))
+    """Channel tables of every group of a result as Markdown."""
+    groups = [(name, DIMENSIONS[name], channels) for name, channels in GROUPS.items()]
+    groups.append(("gauges/NAME, on rail or slab", GAUGE_DIMENSIONS["motion"], GAUGE_MOTION))
+    groups.append(("gauges/NAME, on a fastening", GAUGE_DIMENSIONS["force"], GAUGE_FORCE))
     lines: list[str] = []
     for name, dimensions, channels in groups:
         lines += ["", f"### {name}", "", f"Dimensions: {', '.join(dimensions)}.", ""]
@@ -276,7 +273,7 @@ def channel_tables() -> str:
 
 
 def with_channels(text: str) -> str:
-    """A page with the tables of channels between its marks."""
+    """Replace the channel tables between the marks of a page."""
     begin, rest = text.split("<!-- channels -->")
     _, end = rest.split("<!-- /channels -->")
     return f"{begin}<!-- channels -->\n{channel_tables()}\n<!-- /channels -->{end}"

@@ -1,4 +1,4 @@
-"""Changing single keys of a scenario: ``--set train.speed_kmh=300`` and its Python form."""
+"""Overrides of single keys of a scenario: ``--set train.speed_kmh=300`` and its Python form."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ Overrides = Mapping[str, Any] | Sequence[str]
 def apply_overrides(tables: dict[str, Any], overrides: Overrides) -> dict[str, Any]:
     """Set keys in the tables of a scenario.
 
-    A key may go on into a part that the scenario names: ``track.fastening.vertical_stiffness=5e7`` turns
+    A key may reach into a part that the scenario names: ``track.fastening.vertical_stiffness=5e7`` turns
     ``"ACE2021"`` into ``{like = "ACE2021", vertical_stiffness = 5e7}``.
 
     Args:
         tables: Tables of the scenario; not changed.
-        overrides: What to set, later entries winning.
+        overrides: Keys and values; later entries take precedence.
 
     Returns:
         New tables.
 
     Raises:
-        InputError: A text without ``=``, or a key that goes on into a number.
+        InputError: A text without ``=``, or a key below a number.
     """
     for key, value in _pairs(overrides):
         if key.count(".") >= DEEPEST:
@@ -59,7 +59,7 @@ def parse_value(text: str, key: str = "") -> Any:
 
 
 def _pairs(overrides: Overrides, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted keys and values; nested tables change single keys and do not replace tables."""
+    """Dotted keys and values; a nested table changes single keys and does not replace a table."""
     if not isinstance(overrides, Mapping):
         for text in (overrides,) if isinstance(overrides, str) else overrides:
             key, equals, value = text.partition("=")
@@ -80,13 +80,13 @@ def _replaced(node: Any, path: list[str], value: Any, key: str) -> Any:
     """A copy of ``node`` with the value at ``path`` replaced."""
     if not path:
         return value
-    head, rest = path[0], path[1:]
+    head, tail = path[0], path[1:]
     if isinstance(node, dict):
-        return {**node, head: _replaced(node.get(head, {}), rest, value, key)}
+        return {**node, head: _replaced(node.get(head, {}), tail, value, key)}
     if isinstance(node, str):  # the name of a preset, of which one key is changed
-        return {"like": node, head: _replaced({}, rest, value, key)}
+        return {"like": node, head: _replaced({}, tail, value, key)}
     if isinstance(node, tuple):
         if not head.isdecimal() or len(head) > MOST_DIGITS or int(head) >= len(node):
             raise InputError(f"--set {key}: {head!r} must be an index between 0 and {len(node) - 1}")
-        return tuple(_replaced(item, rest, value, key) if i == int(head) else item for i, item in enumerate(node))
+        return tuple(_replaced(item, tail, value, key) if i == int(head) else item for i, item in enumerate(node))
     raise InputError(f"--set {key}: {head!r} lies below a value that is not a table ({node!r})")

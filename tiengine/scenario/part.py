@@ -1,4 +1,4 @@
-"""A part of vehicle or track as a user states it: a preset's name, a file, or a table."""
+"""Reference to a part of vehicle or track: name of a preset, path of a file, or table."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from tiengine.parameters.presets import LONGEST_PATH
 
 
 def _check_part(value: Any) -> Any:
+    """Refuse what cannot refer to a part."""
     if isinstance(value, str) and len(value) > LONGEST_PATH:
         raise ValueError(f"must have at most {LONGEST_PATH} characters")
     if not isinstance(value, str | dict) or not value:
@@ -18,8 +19,7 @@ def _check_part(value: Any) -> Any:
 
 
 Part = Annotated[str | dict[str, Any], BeforeValidator(_check_part)]
-"""Name of a preset, path of a file, or a table, which may start from a preset: ``{like = "CHN60", ...}``."""
-
+"""Name of a preset, path of a file, or table, which may start from a preset: ``{like = "CHN60", ...}``."""
 
 Presets = dict[str, dict[str, dict[str, Any]]]
 """Tables by kind and name."""

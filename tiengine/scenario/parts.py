@@ -1,8 +1,8 @@
-"""The parts of a scenario: from names, paths and tables to vehicles, rail, slab, fastening and profiles.
+"""Parts of a scenario: vehicles, rail, slab, fastening and profiles from names, paths and tables.
 
 A named part is looked up among the scenario's own presets first, then in the library, or read from its path.
 A profile's table holds ``points``, the text of its two columns (y and z in mm), so that a resolved scenario
-needs no other file.
+needs no other files.
 """
 
 from __future__ import annotations
@@ -42,16 +42,18 @@ class ProfilePoints(Params):
 
     name: Name = "profile"
     source: Source = ""
-    points: Annotated[str, Field(description="y and z in mm, a pair a line")]
-    has_cant: Annotated[bool, Field(description="a rail's points are those of a rail already inclined")] = False
+    points: Annotated[str, Field(description="y and z in mm, one pair per line")]
+    has_cant: Annotated[bool, Field(description="the points are those of a rail already inclined")] = False
     smoothing: Annotated[float, Q("m", "length of the smoothing spline", ge=0, le=5e-3)] = ROUNDING_LENGTH
-    mirror: Annotated[bool | None, Field(description="a rail's gauge face is at positive y")] = None
-    tape_circle: Annotated[float, Q("m", "outward from the points' y = 0; of a wheel", ge=-0.2, le=0.2)] = 0.0
+    mirror: Annotated[bool | None, Field(description="whether the rail's gauge face is at positive y")] = None
+    tape_circle: Annotated[
+        float, Q("m", "distance of a wheel's tape circle outward from the points' y = 0", ge=-0.2, le=0.2)
+    ] = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What a scenario's names stand for.
+    """Parts that a scenario refers to.
 
     Attributes:
         vehicles: The vehicles, the leading one first.
@@ -60,7 +62,7 @@ class Parts:
         rail: Section of the rail.
         rail_profile: Profile of the railhead, upright unless it says otherwise.
         slab: Slab.
-        mortar: Its bed.
+        mortar: Mortar bed of the slab.
         fastening: Fastening.
     """
 
@@ -89,9 +91,9 @@ def collect_presets(train: Train, track: Track, presets: Presets, folder: Path |
     """Copy every preset that a scenario names into it.
 
     Args:
-        train: Names vehicles and the wheel profile.
-        track: Names rail, rail profile, slab and fastening.
-        presets: Tables that the scenario brings; they are not looked up again.
+        train: Train table; names vehicles and wheel profile.
+        track: Track table; names rail, rail profile, slab and fastening.
+        presets: Presets of the scenario; they are not looked up again.
         folder: Where relative paths start.
 
     Returns:
@@ -112,7 +114,7 @@ def collect_presets(train: Train, track: Track, presets: Presets, folder: Path |
             if not isinstance(name, str):
                 raise InputError(f"{where}.like = {str(name)[:80]}: must be the name of a preset or the path of a file")
             if name in seen:
-                raise InputError(f"{where} = {name!r}: is like itself")
+                raise InputError(f"{where} = {name!r}: is defined in terms of itself")
             seen.add(name)
             if name not in tables:
                 tables[name] = _read(where, kind, name, folder)
@@ -126,7 +128,7 @@ def build_parts(train: Train, track: Track, presets: Presets) -> Parts:
     Args:
         train: The train's table.
         track: The track's table.
-        presets: What :func:`collect_presets` returned; names it lacks are read from the library.
+        presets: Result of :func:`collect_presets`; other names are read from the library.
 
     Returns:
         The parts.
@@ -142,10 +144,10 @@ def build_parts(train: Train, track: Track, presets: Presets) -> Parts:
         table.setdefault("name", "vehicle")
         vehicles.append(vehicle_from_table(table, f"train.vehicles[{i}]"))
     slab_table = tables["track.slab"]
-    bed = slab_table.pop("mortar", None)
-    if not isinstance(bed, dict):
-        raise InputError("track.slab.mortar: missing; a table of the bed's values is required")
-    mortar = build(Mortar, bed, "track.slab.mortar")
+    mortar_table = slab_table.pop("mortar", None)
+    if not isinstance(mortar_table, dict):
+        raise InputError("track.slab.mortar: missing; a table of the bed's properties is required")
+    mortar = build(Mortar, mortar_table, "track.slab.mortar")
     if track.mortar_no_tension:
         mortar = mortar.model_copy(update={"no_tension": True})
     return Parts(
@@ -205,8 +207,9 @@ def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _profile(table: dict[str, Any], where: str, kind: Literal["wheel", "rail"]) -> Profile:
-    given = build(ProfilePoints, table, where)
-    rows = [numbers_of(line.replace(",", " ").replace(";", " ").split()) for line in given.points.strip().splitlines()]
+    """Build a profile from its table."""
+    stated = build(ProfilePoints, table, where)
+    rows = [numbers_of(line.replace(",", " ").replace(";", " ").split()) for line in stated.points.strip().splitlines()]
     if len(rows) > MOST_POINTS:
         raise InputError(f"{where}: {len(rows)} points; at most {MOST_POINTS} expected")
     if not all(row is not None and len(row) == 2 for row in rows):
@@ -216,12 +219,12 @@ def _profile(table: dict[str, Any], where: str, kind: Literal["wheel", "rail"]) 
         points,
         kind,
         where,
-        has_cant=given.has_cant,
-        smoothing=given.smoothing,
-        mirror=given.mirror,
-        tape_circle=given.tape_circle,
+        has_cant=stated.has_cant,
+        smoothing=stated.smoothing,
+        mirror=stated.mirror,
+        tape_circle=stated.tape_circle,
     )
-    return Profile(given.name, kind, points[:, 0].copy(), points[:, 1].copy(), given.has_cant, given.smoothing)
+    return Profile(stated.name, kind, points[:, 0].copy(), points[:, 1].copy(), stated.has_cant, stated.smoothing)
 
 
 def _centres(vehicles: list[Vehicle], train: Train) -> NDArray[np.float64]:
@@ -235,7 +238,7 @@ def _centres(vehicles: list[Vehicle], train: Train) -> NDArray[np.float64]:
     else:
         gaps = [pitch] * couplings
     if len(gaps) != couplings:
-        raise InputError(f"train.coupler_pitch = {list(gaps)}: must be one number or {couplings}, one a coupling")
+        raise InputError(f"train.coupler_pitch = {list(gaps)}: must be one number or {couplings}, one per coupling")
     centres = 0.0 - np.concatenate([[0.0], np.cumsum(gaps)])
     for i in range(couplings):
         least = vehicles[i + 1].axle_positions[0] - vehicles[i].axle_positions[-1]

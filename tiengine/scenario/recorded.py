@@ -1,4 +1,4 @@
-"""The scenario that a result file carries."""
+"""Scenario stored in a result file."""
 
 from __future__ import annotations
 
@@ -25,5 +25,5 @@ def recorded_scenario(result: Reader) -> Scenario:
 
 @lru_cache(maxsize=2)
 def _loaded(text: str, name: str) -> Scenario:
-    """Load a text once: a report draws ten figures, and a large ensemble's trains take seconds to build."""
+    """Load a text once: a report draws ten figures, and the trains of a large ensemble take seconds to build."""
     return load_scenario(parse_toml(text, f"{name}: scenario"))

@@ -1,9 +1,9 @@
-"""A scenario: what runs over which track, and how it is computed. TOML outside, frozen parameters inside.
+"""A scenario: train, track, irregularity and numerics of a run, from TOML to frozen parameters.
 
 A part (vehicle, rail, slab, fastening, profile) is given by the name of a preset, by the path of a file
 (relative to the scenario's), or as a table; a table may start from a preset: ``{like = "ACE2021",
 vertical_stiffness = 5e7}``. Loading copies every preset used into ``presets``, so that the text written by
-:func:`to_toml` says all that was run and loads back equal wherever it is read.
+:func:`to_toml` is complete and loads back equal on any machine.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 import tomli_w
 from pydantic import Field
 
-from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.irregularity import IrregularityParams, check_step
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path
 from tiengine.parameters.presets import find_preset
@@ -28,23 +28,22 @@ from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
 from tiengine.track.defects import check_defects
-from tiengine.track.mortar import MortarVoid
+from tiengine.vehicle.train import centre_in_window
 
 __all__ = ["Scenario", "check_wavelength", "duration", "load_scenario", "to_toml"]
 
-WINDOW_MARGIN = 4.0  # m beyond the outer wheels, either end, of the window "auto", see Numerics
-WINDOW_MARGIN_LEAST = 2.0  # m: below this the window's fixed ends, or an absorbing zone, are felt by the outer wheels
-LONGEST_RUN = 1e6  # s: the longest way at 1 m/s
+WINDOW_MARGIN = 4.0  # m beyond the outer wheels at either end of the window "auto", see Numerics
+WINDOW_MARGIN_LEAST = 2.0  # m: closer window ends or absorbing zones change the outer wheels' forces
+LONGEST_RUN = 1e6  # s: the longest distance at 1 m/s
 LONGEST_WINDOW = 2000.0  # m
 MOST_MODES = 3000  # of each rail field: the matrices of a rail then take 2 GB
-STEPS_PER_WAVE = 8.0  # the shortest wave must be passed in no fewer steps (MODEL §6)
 
 
 class Scenario(Params):
-    """All that a run needs to know.
+    """Complete description of a run.
 
     Attributes:
-        presets: Tables of the presets used, by kind and name; they come before the library's.
+        presets: Tables of the presets used, by kind and name; they take precedence over the library's.
     """
 
     name: PlainName = "unnamed"
@@ -62,18 +61,13 @@ class Scenario(Params):
 
     @cached_property
     def members(self) -> tuple[Scenario, ...]:
-        """The scenario of every train of the ensemble, by itself; this one if it is alone."""
+        """Scenario of each train of the ensemble; only this one without an ensemble."""
         return _members(self)
 
     @cached_property
     def parts(self) -> Parts:
-        """The parts that the scenario names, built and checked once."""
+        """Parts that the scenario refers to, built and checked once."""
         return build_parts(self.train, self.track, self.presets)
-
-    @property
-    def mortar_voids(self) -> tuple[MortarVoid, ...]:
-        """Voids of the whole track, as the slab's matrices want them."""
-        return tuple(void.rectangle for void in self.track.mortar_voids)
 
     @cached_property
     def window_length(self) -> float:
@@ -92,8 +86,7 @@ class Scenario(Params):
     @cached_property
     def centre_in_window(self) -> float:
         """Centre of the first vehicle from the window's rear end [m]: the wheels stand in its middle."""
-        x = self.parts.wheelset_positions
-        return self.window_length / 2.0 - 0.5 * float(x.max() + x.min())
+        return centre_in_window(self.window_length, self.parts.wheelset_positions)
 
     @cached_property
     def modes(self) -> int:
@@ -112,7 +105,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
         The scenario with its presets copied into it and its parts built.
 
     Raises:
-        InputError: The first thing that breaks a rule: key, value, rule.
+        InputError: The first value that breaks a rule: key, value, rule.
     """
     folder = None
     if isinstance(source, Scenario):
@@ -138,7 +131,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
 
 
 def _changed(tables: dict[str, Any], ensemble: Ensemble, train: int) -> Scenario:
-    """One train of an ensemble, from the tables of the whole."""
+    """Scenario of one train, from the tables of the ensemble."""
     try:
         return build(Scenario, apply_overrides({**tables, "ensemble": {}}, ensemble.changes(train)))
     except InputError as error:
@@ -146,7 +139,7 @@ def _changed(tables: dict[str, Any], ensemble: Ensemble, train: int) -> Scenario
 
 
 def _members(scenario: Scenario) -> tuple[Scenario, ...]:
-    """Every train of an ensemble; trains that differ in their seed alone share parts."""
+    """Scenario of each train of an ensemble; trains that differ only in their seed share parts."""
     ensemble, first = scenario.ensemble, scenario.irregularity.seed
     if ensemble == Ensemble():
         return (scenario,)
@@ -166,11 +159,11 @@ def _members(scenario: Scenario) -> tuple[Scenario, ...]:
 
 
 def _check_members(scenario: Scenario) -> None:
-    """Rules for every train of an ensemble."""
+    """Check the rules of every train of an ensemble."""
     if scenario.ensemble.seeds and not any(_is_random(train.irregularity) for train in scenario.members):
-        raise InputError("ensemble.seeds: make no difference to a measured irregularity or to none; leave them out")
+        raise InputError("ensemble.seeds: must be left out where no train has a random irregularity")
     if scenario.irregularity.seed + scenario.ensemble.size > 2**63:
-        raise InputError(f"irregularity.seed = {scenario.irregularity.seed}: leaves no seeds for all trains")
+        raise InputError(f"irregularity.seed = {scenario.irregularity.seed}: seeds of all trains must be below 2^63")
     checked: set[str] = set()
     for i, train in enumerate(scenario.members):
         changes = repr(scenario.ensemble.changes(i))
@@ -184,7 +177,7 @@ def _check_members(scenario: Scenario) -> None:
 
 def _is_random(track: IrregularityParams) -> bool:
     """Whether a seed makes a difference."""
-    return track.short_wave or (track.file is None and track.spectrum != "none")
+    return track.short_wave or track.has_spectrum
 
 
 def _absolute_vary(ensemble: Ensemble, folder: Path | None) -> Ensemble:
@@ -205,22 +198,22 @@ def _absolute(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
     path = user_path(name, folder, "irregularity.file")
     try:
         path = path.resolve()
-    except (OSError, RuntimeError) as error:  # links that lead in a circle
+    except (OSError, RuntimeError) as error:  # circular links
         raise InputError(f"irregularity.file = {name!r}: {error}") from None
     return {**tables, "irregularity": {**irregularity, "file": str(path)}}
 
 
 def to_toml(scenario: Scenario) -> str:
-    """The resolved scenario as TOML: every default, every preset used; loads back equal.
+    """Write the resolved scenario as TOML: every default and every preset used; it loads back equal.
 
     Args:
-        scenario: What :func:`load_scenario` returned.
+        scenario: Result of :func:`load_scenario`.
     """
     return tomli_w.dumps(scenario.model_dump(mode="python", exclude_none=True), multiline_strings=True)
 
 
 def _check(scenario: Scenario) -> None:
-    """Rules that join several keys of one train."""
+    """Check the rules that join several keys of one train."""
     parts, window = scenario.parts, scenario.window_length
     least = parts.wheel_span + 2.0 * WINDOW_MARGIN_LEAST
     if window < least:
@@ -236,19 +229,19 @@ def _check(scenario: Scenario) -> None:
     duration = scenario.train.distance / min(scenario.train.speed.speed)
     if duration > LONGEST_RUN:
         raise InputError(
-            f"train.speed_kmh: {scenario.train.distance:g} m would take up to {duration:.3g} s;"
+            f"train.speed_kmh: {scenario.train.distance:g} m take up to {duration:.3g} s;"
             f" must be at most {LONGEST_RUN:g} s"
         )
     zone, widest = scenario.numerics.absorbing_zone, 0.5 * (window - least)
     if zone > widest + 1e-9:
         raise InputError(
             f"numerics.absorbing_zone = {zone:g}: must be at most {widest:g} m in this window"
-            f" ({WINDOW_MARGIN_LEAST:g} m clear of the outer wheels)"
+            f" (it must keep {WINDOW_MARGIN_LEAST:g} m from the outer wheels)"
         )
     if scenario.rear < 0.0:
         raise InputError(
             f"train.start = {scenario.train.start}: must be at least {scenario.centre_in_window:g} m,"
-            " where the window begins at chainage zero"
+            " so that the window begins at or beyond chainage zero"
         )
     step = scenario.numerics.time_step
     if step != "auto":
@@ -276,21 +269,16 @@ def check_wavelength(scenario: Scenario, step: float) -> None:
     """
     irregularity = scenario.irregularity
     shortest = {}
-    if irregularity.spectrum != "none" and irregularity.file is None:
+    if irregularity.has_spectrum:
         shortest["wavelength_min"] = irregularity.wavelength_min
     if irregularity.short_wave:
         shortest["short_wave_min"] = irregularity.short_wave_min
-    least = STEPS_PER_WAVE * scenario.train.speed.fastest * step
     for key, wavelength in shortest.items():
-        if wavelength < least:
-            raise InputError(
-                f"irregularity.{key} = {wavelength:g}: must be at least 8 V dt = {least:.4g} m"
-                f" at a time step of {step:g} s; choose a smaller step or a longer wave"
-            )
+        check_step(wavelength, scenario.train.speed.fastest, step, f"irregularity.{key}")
 
 
 def duration(train: Scenario) -> float:
-    """Time that the way of one train takes [s].
+    """Time one train takes to cover its distance [s].
 
     Args:
         train: Its scenario.

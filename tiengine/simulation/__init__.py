@@ -3,4 +3,4 @@
 import time
 
 IMPORT_BEGAN = time.perf_counter()
-"""When the first of these modules was imported [s]: loading the engine is part of what a user waits for."""
+"""Instant at which the first of these modules was imported [s]: importing is part of the wall time of a run."""

@@ -1,4 +1,4 @@
-"""Writing what the trains of a run send, and counting it."""
+"""Collector of the messages that the trains of a run send: writes their samples and sums up their costs."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ from tiengine.scenario.scenario import Scenario, duration
 from tiengine.simulation.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
 from tiengine.simulation.peak_memory import peak_memory
 
-__all__ = ["Gathering", "Progress", "Tell"]
+__all__ = ["Collector", "Notify", "Progress"]
 
 Progress = Callable[[float, float], None]
-Tell = Callable[[str], None]
+Notify = Callable[[str], None]
 
 FLUSH_SECONDS = 5.0
-"""Wall time after which what was written is made permanent: a commit takes some 20 ms for one train."""
+"""Wall time after which written samples are committed to disk [s]: a commit takes about 20 ms for one train."""
 
 COMMIT_SHARE = 0.01
-"""Of the wall time that commits may take: on a slow disk, or with many trains, they are rarer."""
+"""Largest share of the wall time for commits: on a slow disk, or with many trains, they are rarer."""
 
 ONLY_OF_TRAINS = ("wall_time_loop", "trains_together", "status", "vehicles")
 
 
-class Gathering:
-    """What has come so far.
+class Collector:
+    """Results received so far.
 
     Attributes:
-        failed: Why trains failed, by their number.
-        refused: Trains whose scenario is to blame.
-        latest: Last checkpoint of every task on its way, by its number.
-        ended: Trains of which nothing more will come.
-        tell: Says a sentence to whoever runs this.
+        failed: Reasons why trains failed, by their number.
+        refused: Trains whose scenario was refused.
+        latest: Last checkpoint of every unfinished task, by its number.
+        ended: Trains that send nothing more.
+        notify: Called with a sentence for each event.
     """
 
     def __init__(
@@ -50,21 +50,21 @@ class Gathering:
         writer: Writer,
         path: Path | None = None,
         progress: Progress | None = None,
-        tell: Tell | None = None,
+        notify: Notify | None = None,
     ) -> None:
-        """Begin with nothing.
+        """Begin with no results.
 
         Args:
             scenario: The whole ensemble.
             writer: The open file.
-            path: Where it is, for checkpoints beside it; None in memory.
+            path: Its path, for checkpoints in the same folder; None in memory.
             progress: Called with simulated and whole time [s], of all trains together.
-            tell: Called with a sentence for each event.
+            notify: Called with a sentence for each event.
         """
         self.latest: dict[int, Checkpoint] = {}
         self.ended: set[int] = set()
         self._path = path
-        self.tell: Tell = tell or (lambda words: None)
+        self.notify: Notify = notify or (lambda words: None)
         self._committed, self._pause = time.perf_counter(), FLUSH_SECONDS
         self.failed: dict[int, str] = {}
         self.refused: set[int] = set()
@@ -75,12 +75,12 @@ class Gathering:
         self._costs: list[Costs] = []
         self._writing = 0.0
 
-    def go_on(self, latest: Mapping[int, Checkpoint], workers: int) -> None:
-        """Take over what an earlier session has done.
+    def resume(self, latest: Mapping[int, Checkpoint], workers: int) -> None:
+        """Take over the results of an earlier session.
 
         Args:
-            latest: Checkpoints of tasks on their way, by their number.
-            workers: Processes that share the rest.
+            latest: Checkpoints of unfinished tasks, by their number.
+            workers: Processes that share the remaining work.
         """
         self.latest.update(latest)
         loop = 0.0
@@ -112,7 +112,7 @@ class Gathering:
             case Saved(trains, checkpoint):
                 self._save(trains, checkpoint)
             case Paused():
-                pass  # what it takes to go on has come before
+                pass  # the checkpoint has come before
             case Ended(task, facts, costs):
                 self._costs.append(costs)
                 self.ended.update(facts)
@@ -135,7 +135,7 @@ class Gathering:
 
     @property
     def unfinished(self) -> bool:
-        """Whether trains are left on their way."""
+        """Whether trains have not ended."""
         return len(self.ended) < len(self._facts)
 
     @property
@@ -147,8 +147,8 @@ class Gathering:
         """Complete the file.
 
         Args:
-            started: Wall times [s] before the first message, by what they were for.
-            workers: Worker processes; 0 if all was done here.
+            started: Wall times [s] before the first message, by their purpose.
+            workers: Worker processes; 0 if this process did all.
         """
         simulated = sum(self._simulated.values())
         walls = started | self._walls()
@@ -167,7 +167,7 @@ class Gathering:
         return self._writer.close(attributes)
 
     def _begin(self, begun: Begun) -> None:
-        """Trains begin, or go on from their checkpoint."""
+        """Trains begin, or continue from their checkpoint."""
         saved = self.latest.get(begun.task)
         for train, known in begun.facts.items():
             self._writer.add(train, begun.labels, known | {"status": RUNNING})
@@ -176,7 +176,7 @@ class Gathering:
                 self._writer.rewind(train, saved.facts["rows"][str(train)])
 
     def _save(self, trains: Iterable[int], checkpoint: Checkpoint) -> None:
-        """The file first: a checkpoint never says more than the file holds."""
+        """Commit the file first: a checkpoint must not be ahead of it."""
         rows = {str(train): self._writer.rows(train) for train in trains}
         for train in trains:
             self._writer.describe(train, {"simulated_time": self._simulated[train]})
@@ -197,20 +197,20 @@ class Gathering:
         self._pause = max(FLUSH_SECONDS, (self._committed - clock) / COMMIT_SHARE)
 
     def _forget(self, task: int) -> None:
-        """A task has ended: its checkpoint is of no more use."""
+        """Remove the checkpoint of a task that has ended."""
         self.latest.pop(task, None)
         if self._path is not None:
             checkpoint_path(self._path, task).unlink(missing_ok=True)
 
     def _note(self, events: Mapping[int, Sequence[Event]]) -> None:
         for train, found in events.items():
-            self._writer.note(train, found)
+            self._writer.add_events(train, found)
             of = f"train {train}: " if len(self._facts) > 1 else ""
             for event in found:
-                self.tell(f"{of}{event}")
+                self.notify(f"{of}{event}")
 
     def _fail(self, failed: dict[int, str]) -> None:
-        """Mark trains; nothing more will come of them."""
+        """Mark trains as failed; they send nothing more."""
         self.failed |= failed
         for train in failed:
             self._whole[train] = self._simulated[train]
@@ -223,7 +223,7 @@ class Gathering:
         return f"{len(self.failed)} of {len(self._facts)} trains failed"
 
     def _walls(self) -> dict[str, float]:
-        """Wall times [s]: of processes that work at the same time that of the longest."""
+        """Wall times [s]; among processes that work at the same time the longest counts."""
         spent: dict[str, Counter[int]] = {"jit": Counter(), "setup": Counter(), "loop": Counter()}
         for cost in self._costs:
             for name, per_process in spent.items():
@@ -232,8 +232,8 @@ class Gathering:
         return {**longest, "writing": self._writing}
 
     def _memory(self) -> float:
-        """Peak of all processes together [MB], as if they had their peaks at once."""
-        peaks = {cost.process: cost.memory for cost in self._costs}  # a process's later marks are no smaller
+        """Peak memory of all processes together [MB], as if they peaked at the same time."""
+        peaks = {cost.process: cost.memory for cost in self._costs}  # a process's later peaks are no smaller
         return sum(peaks.values()) + (0.0 if os.getpid() in peaks else peak_memory())
 
     def _common(self) -> dict[str, Any]:

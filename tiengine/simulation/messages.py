@@ -1,7 +1,7 @@
-"""What the trains of a task send to whoever writes the file; it may come from another process.
+"""Messages of the trains of a task to the collector, possibly from another process.
 
-One :class:`Begun`, then an :class:`Advanced` for every thousand steps, a :class:`Saved` now and then, and one
-:class:`Ended`, or :class:`Paused` where they were asked to stop; :class:`Lost` where they could not be set up or died.
+One :class:`Begun`, then an :class:`Advanced` for every thousand steps, a :class:`Saved` for every checkpoint, and one
+:class:`Ended`, or :class:`Paused` after a request to stop; :class:`Lost` where they could not be set up or died.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Begun:
     Attributes:
         task: Number of their task.
         labels: Labels of each of them.
-        facts: What is known of each train from the beginning, by its number.
+        facts: Facts of each train that are known from the start, by its number.
     """
 
     task: int
@@ -36,10 +36,10 @@ class Advanced:
     """Trains have advanced by some steps.
 
     Attributes:
-        time: Simulated since the beginning [s].
+        time: Simulated time since the start [s].
         blocks: Samples of each train that runs, by its number; a train that fails is in it for the last time.
-        failed: Why trains failed in these steps.
-        events: What happened to trains in them.
+        failed: Reasons why trains failed in these steps, by their number.
+        events: Events of trains in these steps, by their number.
     """
 
     time: float
@@ -50,11 +50,11 @@ class Advanced:
 
 @dataclass(frozen=True, eq=False)
 class Saved:
-    """What trains need to go on from here.
+    """Checkpoint of trains.
 
     Attributes:
         trains: Their numbers.
-        checkpoint: Of their task; the receiver adds how far the file has come.
+        checkpoint: Checkpoint of their task; the receiver adds the length of the file's datasets.
     """
 
     trains: tuple[int, ...]
@@ -63,7 +63,7 @@ class Saved:
 
 @dataclass(frozen=True)
 class Paused:
-    """Trains that stopped because they were asked to, after they were saved.
+    """Trains that stopped on request, after they were saved.
 
     Attributes:
         trains: Their numbers.
@@ -74,14 +74,14 @@ class Paused:
 
 @dataclass(frozen=True)
 class Costs:
-    """Wall times [s] of a task, and the memory of the process that did it.
+    """Wall times [s] of a task, and the memory of its process.
 
     Attributes:
-        process: Its number.
+        process: Number of the process.
         jit: Compiling kernels.
         setup: Everything else before the loop.
         loop: The loop, with the time that the receiver of its messages took.
-        memory: Peak of the process so far [MB].
+        memory: Peak memory of the process so far [MB].
     """
 
     process: int
@@ -93,12 +93,12 @@ class Costs:
 
 @dataclass(frozen=True, eq=False)
 class Ended:
-    """Trains have run to the end of their way, or failed.
+    """Trains have run their whole distance, or failed.
 
     Attributes:
         task: Number of their task.
-        facts: What is known of each train at the end, by its number.
-        costs: Of all of them.
+        facts: Facts of each train at the end, by its number.
+        costs: Costs of all of them.
     """
 
     task: int
@@ -108,12 +108,12 @@ class Ended:
 
 @dataclass(frozen=True)
 class Lost:
-    """Trains that stop here, whatever they have sent.
+    """Trains that end here without an :class:`Ended`.
 
     Attributes:
         trains: Their numbers.
-        why: A sentence.
-        refused: Whether their scenario is to blame.
+        why: A sentence with the reason.
+        refused: Whether their scenario was refused.
     """
 
     trains: tuple[int, ...]

@@ -9,10 +9,10 @@ __all__ = ["peak_memory"]
 
 
 def peak_memory() -> float:
-    """Most memory that this process has held so far [MB].
+    """Peak memory of this process so far [MB].
 
-    On Linux the kernel's own mark of this program; ``getrusage`` there counts what the parent held before it started
-    this one.
+    On Linux it is the kernel's high-water mark of this program; ``getrusage`` would there include the memory of the
+    parent at the time it started this process.
     """
     if sys.platform == "win32":
         return float("nan")

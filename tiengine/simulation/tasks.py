@@ -1,17 +1,20 @@
-"""Which trains of an ensemble are advanced together.
+"""Tasks: trains of an ensemble that are advanced together.
 
 Trains that share everything but their irregularity share matrices, clock and seat phase: they form a group. A group is
-cut into tasks of equal size, the last filled up with copies of its last train, which are not written. Tasks follow
+cut into tasks of equal size; the last task is padded with copies of its last train, which are not written. Tasks follow
 from the scenario alone: BLAS adds in an order that depends on the number of right-hand sides, so that the bits of a
-train depend on how many stand beside it, but neither on which they are nor on who computes them.
+train depend on the number of trains in its task, but neither on which they are nor on the process that computes them.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
+from tiengine.irregularity.irregularity import IrregularityParams, shortest_wavelength
+from tiengine.irregularity.track_function import TrackFunction, recorded_name
+from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario, to_toml
 
 __all__ = ["TRAINS_TOGETHER", "Task", "plan"]
@@ -25,60 +28,81 @@ class Task:
     """Trains that are advanced together.
 
     Attributes:
-        number: Of the task, from 0.
-        scenario: The first train's; the others differ in their irregularity alone.
+        number: Number of the task, from 0.
+        scenario: Scenario of the first train; the others differ in their irregularity alone.
         trains: Numbers of the trains in the ensemble.
-        tracks: Irregularity of every train, then of those that fill up the task.
+        tracks: Irregularity of every train, then of the copies that pad the task.
+        functions: Functions that give the tracks; empty where none does.
     """
 
     number: int
     scenario: Scenario
     trains: tuple[int, ...]
     tracks: tuple[IrregularityParams, ...]
+    functions: tuple[TrackFunction, ...] = ()
 
     @property
     def size(self) -> int:
-        """Trains advanced together, those that fill up included."""
+        """Trains advanced together, copies included."""
         return len(self.tracks)
 
 
-def plan(scenario: Scenario, together: int = TRAINS_TOGETHER) -> tuple[Task, ...]:
+def plan(
+    scenario: Scenario, together: int = TRAINS_TOGETHER, functions: Sequence[TrackFunction] = ()
+) -> tuple[Task, ...]:
     """Cut an ensemble into tasks.
 
     Args:
         scenario: The whole ensemble.
         together: Most trains in a task.
+        functions: Function that gives the track of every train; empty where none does.
 
     Raises:
-        InputError: A file of measured irregularity cannot be read.
+        InputError: A file of measured irregularity cannot be read, or the functions are not those of the scenario.
     """
+    _check_functions(scenario, functions)
     members = scenario.members
     groups: dict[str, list[int]] = {}
     for i, train in enumerate(members):
         groups.setdefault(_shared(train), []).append(i)
     tasks: list[Task] = []
     for group in groups.values():
-        tasks += _tasks(members, group, together, len(tasks))
+        tasks += _tasks(members, functions, group, together, len(tasks))
     return tuple(tasks)
 
 
-def _tasks(members: tuple[Scenario, ...], group: list[int], together: int, number: int) -> list[Task]:
+def _check_functions(scenario: Scenario, functions: Sequence[TrackFunction]) -> None:
+    """Refuse missing functions, and others than the run was begun with."""
+    named, found = scenario.irregularity.function, recorded_name(functions)
+    if named is None and functions:
+        raise InputError(f"irregularity: function {found!r}: must be left out; the run was begun without one")
+    if named is not None and not functions:
+        raise InputError(
+            f"irregularity.function = {named!r}: the track is given by a Python function, which must be passed again:"
+            " tiengine.resume(file, irregularity=function), or tiengine.run for a new run"
+        )
+    if named is not None and named != found:
+        raise InputError(f"irregularity: function {found!r}: must be {named!r}, with which the run was begun")
+
+
+def _tasks(
+    members: tuple[Scenario, ...], functions: Sequence[TrackFunction], group: list[int], together: int, number: int
+) -> list[Task]:
     """A group in tasks of equal size, counted from ``number``."""
     count = math.ceil(len(group) / together)
     size = math.ceil(len(group) / count)
     tasks: list[Task] = []
     for first in range(0, len(group), size):
         trains = tuple(group[first : first + size])
-        filled = (*trains, *(trains[-1],) * (size - len(trains)))
-        tasks.append(
-            Task(number + len(tasks), members[trains[0]], trains, tuple(members[i].irregularity for i in filled))
-        )
+        padded = (*trains, *(trains[-1],) * (size - len(trains)))
+        tracks = tuple(members[i].irregularity for i in padded)
+        given = tuple(functions[i] for i in padded if functions)
+        tasks.append(Task(number + len(tasks), members[trains[0]], trains, tracks, given))
     return tasks
 
 
 def _shared(train: Scenario) -> str:
     """Text that is the same for trains of one group: the irregularity's shortest wave matters to the time step."""
-    track = train.irregularity
-    shortest = track.shortest_wavelength if track.file is None else make_irregularity(track, 0.0).shortest_wavelength
-    rest = train.model_copy(update={"irregularity": IrregularityParams(), "presets": {}})
-    return f"{shortest!r}\n{to_toml(rest)}"
+    shortest = shortest_wavelength(train.irregularity)
+    others = train.model_copy(update={"irregularity": IrregularityParams(), "presets": {}})
+    return f"{shortest!r}\n{to_toml(others)}"

@@ -1,110 +1,82 @@
-"""The time loop of a group of trains, as a stream of messages to whoever writes the file.
+"""Time loop of a group of trains, chunk by chunk of steps.
 
 A train that fails is computed on to the end with the others and not written, so that the other trains keep their bits.
-Between two chunks of steps all that the rest of the run depends on fits in a checkpoint of plain arrays.
+Between two chunks of steps a checkpoint can be made (:mod:`tiengine.simulation.restart`).
 """
 
 from __future__ import annotations
 
-import math
-import os
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium, release
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.stepper import Stepper
 from tiengine.engine.time_step import prepare
 from tiengine.irregularity.irregularity import Irregularity, check_reach, make_irregularity
-from tiengine.kernels import layout as at
 from tiengine.model.model import Model
-from tiengine.parameters.errors import InputError
 from tiengine.recording.guards import Guard
 from tiengine.recording.recorder import Recorder
 from tiengine.recording.trackside import Trackside
-from tiengine.result_files.checkpoint import Checkpoint
 from tiengine.result_files.layout import Block, TrainLabels
 from tiengine.scenario.scenario import Scenario
-from tiengine.simulation.messages import Advanced, Begun, Costs, Ended, Lost, Message, Paused, Saved
-from tiengine.simulation.peak_memory import peak_memory
+from tiengine.simulation.messages import Advanced
 from tiengine.simulation.tasks import Task
 
-__all__ = ["CHUNK_STEPS", "Run", "march", "never"]
+__all__ = ["CHUNK_STEPS", "LoopTimer", "Run"]
 
 CHUNK_STEPS = 1000
 
-
-def never() -> bool:
-    """Nobody asks to stop."""
-    return False
+Rows = tuple[int, int, int]
 
 
-def march(
-    task: Task,
-    *,
-    public: bool = False,
-    saved: Checkpoint | None = None,
-    every: float = math.inf,
-    stop: Callable[[], bool] = never,
-) -> Iterator[Message]:
-    """Set up the trains of a task and run them to the end of their way.
+class LoopTimer:
+    """Hooks of the loop for a profiler; these measure nothing."""
 
-    Args:
-        task: The trains.
-        public: Launch kernels by public Taichi calls only.
-        saved: Where to go on; None begins at the beginning.
-        every: Wall time between two checkpoints [s].
-        stop: Asked after every chunk of steps; if true, the trains are saved and left.
+    def lap(self, name: str | None) -> None:
+        """Mark the end of a part of the work that is done once a chunk.
 
-    Yields:
-        What the file needs, as it comes.
-    """
-    clock = time.perf_counter()
-    try:
-        run = Run.begin(task, public, saved)
-    except InputError as error:
-        yield Lost(task.trains, str(error), refused=True)
-        return
-    setup = time.perf_counter() - clock - run.jit
-    yield Begun(task.number, run.labels, _facts(task, run.model))
-    before = 0.0 if saved is None else float(saved.facts["loop"])
-    clock = last = time.perf_counter()
-    for advanced in run.blocks():
-        yield advanced
-        now, asked = time.perf_counter(), stop()
-        if run.on_its_way and (asked or now - last >= every):
-            yield Saved(task.trains, run.saved(before + now - clock))
-            last = time.perf_counter()
-            if asked:
-                yield Paused(task.trains)
-                return
-    loop = before + time.perf_counter() - clock
-    yield Ended(task.number, run.ends(loop), Costs(os.getpid(), run.jit, setup, loop, peak_memory()))
+        Args:
+            name: The part; None begins the first.
+        """
+
+    def take(self, stepper: Stepper, rows: Iterable[Rows]) -> None:
+        """Take the steps of a chunk.
+
+        Args:
+            stepper: Is loaded.
+            rows: Row of the chunk, of the wheels' and of the bodies' record of each step (-1 none).
+        """
+        for row in rows:
+            stepper.step(*row)
 
 
 @dataclass(eq=False)
 class Run:
-    """Trains on their way.
+    """Running trains of a task.
 
     Attributes:
-        task: Who runs.
-        model, stepper, recorder, trackside: What advances and records them.
-        tracks: Irregularity under each train, those that fill up the task included.
+        task: The trains.
+        stepper: Advances them.
+        recorder, trackside: Record them and their track.
+        tracks: Irregularity under each train, those that pad the task included.
         jit: Wall time of compiling [s].
-        guard: Looks for what goes wrong.
+        guard: Checks their state.
         steps: Steps that each train has made, by its place.
         alive: Places of the trains that have not failed.
         position: Chainage of the first vehicle's centre [m].
         done: Steps so far.
+        timer: Hooks for a profiler.
     """
 
     task: Task
-    model: Model
     stepper: Stepper
     recorder: Recorder
     trackside: Trackside
@@ -115,87 +87,124 @@ class Run:
     alive: list[int]
     position: float
     done: int = 0
+    timer: LoopTimer = field(default_factory=LoopTimer)
 
     @classmethod
-    def begin(cls, task: Task, public: bool = False, saved: Checkpoint | None = None) -> Run:
-        """Set up: model, start, buffers, kernels.
+    def begin(cls, task: Task, public: bool = False, at_rest: bool = False) -> Run:
+        """Set up model, start, buffers and kernels.
 
         Args:
             task: The trains.
             public: Launch kernels by public Taichi calls only.
-            saved: Where to go on; None begins at the beginning.
+            at_rest: Leave the state at rest, for a checkpoint to fill.
 
         Raises:
-            InputError: The scenario breaks a rule that only shows in set-up, or the checkpoint does not fit it.
+            InputError: The scenario breaks a rule that only shows in set-up.
         """
-        scenario = task.scenario
-        model, jit = prepare(scenario, public, task.size)
-        recorder = Recorder(scenario, model.given.newmark.dt)
-        state = State.at_rest(model) if saved else _started(scenario, model)
+        model, jit = prepare(task.scenario, public, task.size)
+        run = cls.of(task, model, public=public, at_rest=at_rest)
+        run.jit += jit
+        return run
+
+    @classmethod
+    def of(cls, task: Task, model: Model, *, public: bool = False, at_rest: bool = False) -> Run:
+        """Set up start, buffers and kernels for a model.
+
+        Args:
+            task: The trains.
+            model: Their constant data.
+            public: Launch kernels by public Taichi calls only.
+            at_rest: Leave the state at rest, for a checkpoint to fill.
+
+        Raises:
+            InputError: The scenario breaks a rule that only shows in set-up.
+        """
+        scenario, ingredients = task.scenario, model.ingredients
+        recorder = Recorder(scenario, ingredients.newmark.dt)
+        state = SineState.at_rest(model) if at_rest else _started(scenario, model)
         rows = (CHUNK_STEPS // every + 1 for every in (recorder.wheel_every, recorder.body_every))
-        chunk = Chunk.empty(model, CHUNK_STEPS, *rows)
+        chunk = Chunk.empty(ingredients, CHUNK_STEPS, *rows)
         parallel = scenario.numerics.threads > 1 and task.size > 1
-        stepper = Stepper(model, state, chunk, parallel=parallel, public=public)
-        jit += stepper.compile()
-        trackside = Trackside.beside(scenario, stepper)
-        lead = scenario.rear + float(model.wheel_s.max())
-        tracks = [make_irregularity(track, lead) for track in task.tracks]
-        start = scenario.rear + model.centre_s
-        check_reach(tracks, start + scenario.train.distance + float(model.given.train.wheelset_x.max()))
-        guard = Guard.beside(stepper, scenario.events, np.array([track.end for track in tracks]))
+        stepper = SineStepper(model, state, chunk, parallel=parallel, public=public)
+        jit = stepper.compile()
+        trackside = Trackside.watching(scenario, stepper)
+        lead = scenario.rear + float(ingredients.wheel_s.max())
+        tracks = [make_irregularity(track, lead, f) for track, f in zip_longest(task.tracks, task.functions)]
+        start = scenario.rear + ingredients.centre_s
+        check_reach(tracks, start + scenario.train.distance + float(ingredients.train.wheelset_x.max()))
+        guard = Guard.watching(stepper, scenario.events, np.array([track.end for track in tracks]))
         places = list(range(len(task.trains)))
         steps = np.zeros(len(places), np.int64)
-        run = cls(task, model, stepper, recorder, trackside, tracks, jit, guard, steps, places, start)
-        if saved is not None:
-            run._restore(saved)
-        return run
+        return cls(task, stepper, recorder, trackside, tracks, jit, guard, steps, places, start)
 
     @property
     def labels(self) -> TrainLabels:
         """Labels of each train."""
-        labels = self.recorder.labels(self.model.given.train, self.model.given.slots)
+        labels = self.recorder.labels(self.stepper.ingredients.train, self.stepper.ingredients.slots)
         return replace(labels, point_offset=self.trackside.point_offset)
 
     @property
-    def on_its_way(self) -> bool:
-        """Whether there is some way left, and a train to run it."""
+    def unfinished(self) -> bool:
+        """Whether some distance is left, and a train to run it."""
         return self.position < self._end - 1e-9 and bool(self.alive)
 
     @property
     def _end(self) -> float:
-        """Chainage of the first vehicle's centre where the way ends [m]."""
+        """Chainage of the first vehicle's centre at the end of the distance [m]."""
         scenario = self.task.scenario
-        return scenario.rear + self.model.centre_s + scenario.train.distance
+        return scenario.rear + self.stepper.ingredients.centre_s + scenario.train.distance
 
     def blocks(self) -> Iterator[Advanced]:
-        """Advance by a chunk of steps at a time to the end of the way, or until no train is left."""
-        train, dt = self.task.scenario.train, self.model.given.newmark.dt
-        while self.on_its_way:
-            x, V, V_rate = train.speed.advance(self.position, dt, CHUNK_STEPS)
-            count = min(int(np.searchsorted(x, self._end - 1e-9)), CHUNK_STEPS)
-            sent = self._advance(x[1 : count + 1], V[1 : count + 1], V_rate[1 : count + 1])
-            self.done, self.position = self.done + count, float(x[count])
-            yield sent
+        """Advance chunk by chunk to the end of the distance, or until no train is left."""
+        while self.unfinished:
+            yield self.advance(CHUNK_STEPS)
         if self.alive:
-            trains, rest = self.task.trains, self.trackside.rest()
-            yield Advanced(time=self.done * dt, blocks={trains[b]: rest[b] for b in self.alive}, failed={})
+            trains, left = self.task.trains, self.trackside.remainder()
+            time = self.done * self.recorder.dt
+            yield Advanced(time=time, blocks={trains[b]: left[b] for b in self.alive}, failed={})
 
-    def _advance(self, x: NDArray[np.float64], V: NDArray[np.float64], V_rate: NDArray[np.float64]) -> Advanced:
-        """The coming steps; the first vehicle's centre ends each of them at chainage x [m]."""
-        recorder, chunk, trains, done = self.recorder, self.stepper.chunk, self.task.trains, self.done
-        wheels = x[:, None] + self.model.given.train.wheelset_x
-        felt = np.stack([track.sample(wheels) for track in self.tracks])
-        self.stepper.load(x - self.model.centre_s, V, V_rate, felt)
-        self.guard.load(done, x)
-        with np.errstate(over="ignore", invalid="ignore"):  # until the guard looks
-            for step in recorder.rows(done, len(x)):
-                self.stepper.step(*step)
-            self.stepper.fill_pressures(recorder.body_rows(done, len(x)))
+    def advance(self, most: int) -> Advanced:
+        """Take a chunk of steps.
+
+        Args:
+            most: Steps to take, up to ``CHUNK_STEPS``; fewer where the distance ends.
+        """
+        self.timer.lap(None)
+        x = self._load(most)
+        done, count, recorder = self.done, len(x), self.recorder
+        with np.errstate(over="ignore", invalid="ignore"):  # until the guard checks
+            self.timer.take(self.stepper, recorder.rows(done, count))
+            self.timer.lap(None)
+            self.stepper.finish(recorder.body_rows(done, count))
+        self.timer.lap("mortar")
+        sent = self._collect(x)
+        self.done += count
+        return sent
+
+    def _load(self, most: int) -> NDArray[np.float64]:
+        """Fill the buffers for the coming steps; chainage of the first vehicle's centre at their ends [m], (steps,)."""
+        ingredients, speed = self.stepper.ingredients, self.task.scenario.train.speed
+        x, V, V_rate = speed.advance(self.position, ingredients.newmark.dt, most)
+        count = min(int(np.searchsorted(x, self._end - 1e-9)), most)
+        x, V, V_rate = x[1 : count + 1], V[1 : count + 1], V_rate[1 : count + 1]
+        self.timer.lap("window and seats")
+        wheels = x[:, None] + ingredients.train.wheelset_x
+        irregularity = np.stack([track.sample(wheels) for track in self.tracks])
+        self.timer.lap("irregularity")
+        self.stepper.load(x - ingredients.centre_s, V, V_rate, irregularity)
+        self.guard.load(self.done, x)
+        self.position = float(x[-1])
+        self.timer.lap("window and seats")
+        return x
+
+    def _collect(self, x: NDArray[np.float64]) -> Advanced:
+        """Blocks and events of the steps that end at chainages x [m]; trains that failed are taken out."""
+        recorder, trains, done = self.recorder, self.task.trains, self.done
         events = self.guard.take()
         failed = {b: str(events[b][-1]) for b in self.alive if b in self.guard.stopped}
-        blocks = recorder.blocks(chunk, done + 1, x, self.alive)
-        beside = self.trackside.blocks(recorder.ends(done + 1, len(x)), x, failed)
-        found = {b: block | beside[b] for b, block in zip(self.alive, blocks, strict=True)}
+        blocks = recorder.blocks(self.stepper.chunk, done + 1, x, self.alive)
+        of_track = self.trackside.blocks(recorder.ends(done + 1, len(x)), x, failed)
+        found = {b: block | of_track[b] for b, block in zip(self.alive, blocks, strict=True)}
         for b in failed:
             found[b] = _until(found[b], self.guard.stopped[b] * recorder.dt)
         for b in self.alive:
@@ -209,57 +218,8 @@ class Run:
         self.alive = [b for b in self.alive if b not in failed]
         return sent
 
-    def saved(self, loop: float) -> Checkpoint:
-        """All that the rest of the run depends on, between two chunks.
-
-        Args:
-            loop: Wall time of the loop so far [s].
-        """
-        state, watch = self.stepper.state, self.guard.watch
-        arrays = {f"state.{name}": getattr(state, name) for name in _arrays_of(state)}
-        arrays |= {f"watch.{name}": getattr(watch, name) for name in _arrays_of(watch)}
-        arrays |= {f"trackside.{name}": value for name, value in self.trackside.saved().items()}
-        facts = {
-            "done": self.done,
-            "position": self.position,
-            "loop": loop,
-            "speed": self.stepper.factored_speed,
-            "first_seat": state.first_seat,
-            "first_slab": state.first_slab,
-            "steps": self.steps.tolist(),
-            "alive": self.alive,
-            "stopped": {str(place): step for place, step in self.guard.stopped.items()},
-        }
-        return Checkpoint(self.task.number, facts, arrays)
-
-    def _restore(self, saved: Checkpoint) -> None:
-        """Go on from a checkpoint.
-
-        Raises:
-            InputError: It does not fit the scenario.
-        """
-        state, watch, facts = self.stepper.state, self.guard.watch, saved.facts
-        try:
-            for part, target in (("state", state), ("watch", watch)):
-                for name in _arrays_of(target):
-                    given, own = saved.arrays[f"{part}.{name}"], getattr(target, name)
-                    if given.shape != own.shape or given.dtype != own.dtype:
-                        raise ValueError(f"{part}.{name}: shape {given.shape}, here {own.shape}")
-                    own[:] = given
-            prefix = "trackside."
-            self.trackside.restore(
-                {key.removeprefix(prefix): a for key, a in saved.arrays.items() if key.startswith(prefix)}
-            )
-            state.first_seat, state.first_slab = int(facts["first_seat"]), int(facts["first_slab"])
-            self.done, self.position = int(facts["done"]), float(facts["position"])
-            self.alive, self.steps[:] = [int(b) for b in facts["alive"]], facts["steps"]
-            self.guard.stopped = {int(place): int(step) for place, step in facts["stopped"].items()}
-            self.stepper.factor(float(facts["speed"]))
-        except (KeyError, ValueError, TypeError, AttributeError) as error:
-            raise InputError(f"checkpoint of task {saved.task}: does not fit the scenario ({error})") from None
-
     def ends(self, loop: float) -> dict[int, dict[str, Any]]:
-        """What is known of each train at its end."""
+        """Facts of each train at its end, by its number."""
         iterations = self.stepper.state.iterations
         return {
             number: {
@@ -273,42 +233,21 @@ class Run:
         }
 
 
-def _started(scenario: Scenario, model: Model) -> State:
-    """The trains at t = 0."""
-    state = State.at_rest(model)
+def _started(scenario: Scenario, model: Model) -> SineState:
+    """State of the trains at t = 0."""
+    state = SineState.at_rest(model)
     if scenario.numerics.start == "equilibrium":
-        equilibrium(model, state, scenario.rear, *scenario.train.speed.at(scenario.rear + model.centre_s))
+        equilibrium(model, state, scenario.rear, *scenario.train.speed.at(scenario.rear + model.ingredients.centre_s))
     else:
         release(model, state, scenario.rear)
     return state
 
 
-def _facts(task: Task, model: Model) -> dict[int, dict[str, Any]]:
-    """What is known of each train from the beginning."""
-    given = model.given
-    shared = {
-        **{f"dofs_{name}": count for name, count in model.dof_counts.items() if name != "total"},
-        "dofs": model.dof_counts["total"],
-        "time_step": given.newmark.dt,
-        "passes": given.passes,
-        "window_length": given.length,
-        "modes": given.modes,
-        "slabs": given.slots,
-        "seats_in_window": int(model.dims[at.SEATS]),
-    }
-    return {number: {**shared, "seed": task.tracks[b].seed} for b, number in enumerate(task.trains)}
-
-
 def _until(blocks: dict[str, Block], time: float) -> dict[str, Block]:
-    """What was sampled up to a time [s]; envelopes are not in it."""
+    """Samples up to a time [s]; envelopes are not among them."""
     kept = {}
     for name, block in blocks.items():
         count = int(np.searchsorted(block.along, time * (1.0 + 1e-12), side="right"))
         channels = {channel: values[:count] for channel, values in block.channels.items()}
-        kept[name] = Block(block.along[:count], block.place[:count], channels)
+        kept[name] = Block(block.along[:count], block.chainage[:count], channels)
     return kept
-
-
-def _arrays_of(part: Any) -> list[str]:
-    """Names of the arrays of a dataclass."""
-    return [each.name for each in fields(part) if isinstance(getattr(part, each.name), np.ndarray)]

@@ -6,7 +6,7 @@ Seats and slabs are counted from chainage 0: seat j stands at (j + 1/2) d and sl
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Annotated, Literal
 
 import numpy as np
@@ -15,22 +15,22 @@ from pydantic import Field
 
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
-from tiengine.track.mortar import MortarVoid, bed_factors
+from tiengine.track.mortar import MortarVoid, check_void
 from tiengine.track.slab import Slab
 
-__all__ = ["FailedFastenings", "MortarDefect", "check_defects", "fastening_factors"]
+__all__ = ["FailedFastenings", "check_defects", "fastening_factors"]
 
-SIDES = {"left": (0,), "right": (1,), "both": (0, 1)}
+RAILS = {"left": (0,), "right": (1,), "both": (0, 1)}
 
-MOST_VOIDS = 100  # of one slab
+MOST_VOIDS = 100  # per slab
 
 SeatIndex = Annotated[int, Field(ge=0)]
 
 
 class FailedFastenings(Params):
-    """A row of neighbouring fastenings of one rail or both, scaled by a factor."""
+    """Consecutive fastenings of one rail or both, scaled by a factor."""
 
-    rail: Annotated[Literal["left", "right", "both"], Field(description="which rail's")] = "both"
+    rail: Annotated[Literal["left", "right", "both"], Field(description="rail of the fastenings")] = "both"
     seats: Annotated[
         tuple[SeatIndex, SeatIndex],
         Field(description="first and last; seat j stands at (j + 1/2) seat pitches"),
@@ -38,56 +38,38 @@ class FailedFastenings(Params):
     factor: Annotated[float, Q("-", "0 failed, below 1 degraded; scales stiffness and damping", ge=0, le=10)] = 0.0
 
 
-class MortarDefect(Params):
-    """A rectangle of one slab whose bed is missing or scaled.
-
-    x is measured from the slab's rear edge, y from its centre line, positive to the right.
-    """
-
-    slab: Annotated[int, Q("-", "slab i lies between i and i + 1 slab pitches", ge=0)]
-    x: Annotated[tuple[float, float], Field(description="from, to", json_schema_extra={"unit": "m"})]
-    y: Annotated[tuple[float, float], Field(description="from, to", json_schema_extra={"unit": "m"})]
-    factor: Annotated[float, Q("-", "0 void, 1 sound; scales stiffness and damping", ge=0, le=10)] = 0.0
-
-    @property
-    def rectangle(self) -> MortarVoid:
-        """The void in the form that the slab's matrices take."""
-        x, y = self.x, self.y
-        return MortarVoid(slab=self.slab, x_from=x[0], x_to=x[1], y_from=y[0], y_to=y[1], factor=self.factor)
-
-
 def fastening_factors(failed: Iterable[FailedFastenings], first: int, count: int) -> NDArray[np.float64]:
-    """Factors of a row of seats.
+    """Return the factors of consecutive seats.
 
     Args:
-        failed: Rows of the scenario; where two overlap, their factors multiply.
+        failed: Entries of the scenario; where two overlap, their factors multiply.
         first: Index of the first seat.
         count: Number of seats.
 
     Returns:
-        Factors, 1 where sound, shape (count, 2); side 0 is left.
+        Factors, 1 where intact, shape (count, 2); side 0 is left.
     """
     factors = np.ones((count, 2))
     for row in failed:
-        for side in SIDES[row.rail]:
+        for side in RAILS[row.rail]:
             factors[max(row.seats[0] - first, 0) : max(row.seats[1] + 1 - first, 0), side] *= row.factor
     return factors
 
 
 def check_defects(
     failed: Iterable[FailedFastenings],
-    voids: Sequence[MortarDefect],
+    voids: Iterable[MortarVoid],
     *,
     end: float,
     slab: Slab,
 ) -> None:
-    """Refuse defects that the run never meets or that lie outside a slab.
+    """Refuse defects that the run never reaches or that lie outside a slab.
 
     Args:
         failed: Fastenings of the scenario.
         voids: Voids of the scenario.
         end: Chainage of the window's front end at the end of the run [m].
-        slab: Gives the pitches of seats and slabs and a slab's size.
+        slab: Slab with its dimensions and the pitches of seats and slabs.
 
     Raises:
         InputError: Names the entry, its value and the range.
@@ -100,25 +82,13 @@ def check_defects(
             raise InputError(f"{where}: must be [first, last] with first <= last")
         if row.seats[1] > last_seat:
             raise InputError(f"{where}: must be between 0 and {last_seat}, the last seat of this run")
+    by_slab: dict[int, list[MortarVoid]] = {}
     for i, void in enumerate(voids):
         where = f"track.mortar_voids[{i}]"
         if void.slab > last_slab:
             raise InputError(f"{where}.slab = {void.slab}: must be between 0 and {last_slab}, the last of this run")
-        _check_span(f"{where}.x", void.x, 0.0, slab.length, "the slab's length")
-        _check_span(f"{where}.y", void.y, -slab.width / 2, slab.width / 2, "the slab's width")
-    by_slab: dict[int, list[MortarVoid]] = {}
-    for void in voids:
-        by_slab.setdefault(void.slab, []).append(void.rectangle)
-    for rectangles in by_slab.values():
-        if len(rectangles) > MOST_VOIDS:
-            index = rectangles[0].slab
-            raise InputError(
-                f"track.mortar_voids: {len(rectangles)} of slab {index}: must be at most {MOST_VOIDS} a slab"
-            )
-        bed_factors(slab.length, slab.width, (1, 1), rectangles)  # refuses voids that overlap
-
-
-def _check_span(where: str, span: tuple[float, float], low: float, high: float, what: str) -> None:
-    if not low <= span[0] < span[1] <= high:
-        rule = f"must be [from, to] with {low:g} <= from < to <= {high:g} m ({what})"
-        raise InputError(f"{where} = {list(span)}: {rule}")
+        same_slab = by_slab.setdefault(void.slab, [])
+        if len(same_slab) == MOST_VOIDS:
+            raise InputError(f"track.mortar_voids: slab {void.slab} has more than {MOST_VOIDS} voids")
+        check_void(void, slab.length, slab.width, same_slab, where)
+        same_slab.append(void)

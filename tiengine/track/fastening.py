@@ -1,4 +1,4 @@
-"""Rail fastenings: parameters, and the constant tables of the seats' shapes (MODEL §3)."""
+"""Rail fastenings: parameters and constant tables of the trial functions at the seats (MODEL §3)."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class Fastening(Params):
 
 
 def seat_count(length: float, spacing: float) -> int:
-    """Most seats that a window can hold at once: the first may stand anywhere in (0, d]."""
+    """Largest number of seats in a window: the first may lie anywhere in (0, d]."""
     return int(np.ceil(length / spacing - 1e-9)) + 1
 
 
 def seat_tables(modes: int, length: float, spacing: float) -> NDArray[np.float64]:
-    """Constant half of the seats' shape functions.
+    """Tabulate the constant factors of the trial functions at the seats.
 
     Args:
-        modes: Modes N of a field.
+        modes: Modes N per field.
         length: Window l [m].
         spacing: Seat pitch d [m].
 

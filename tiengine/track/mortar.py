@@ -1,4 +1,4 @@
-"""Mortar bed under the slabs: a Winkler foundation, its voids, its quadrature.
+"""Mortar bed under the slabs: Winkler foundation, voids and quadrature.
 
 The bed presses on the slab with k_m w + c_m dw/dt per area, consistent with the plate's shape functions
 (integral of N^T N), and holds its rigid lateral motion. A void scales both over a rectangle of one slab.
@@ -11,15 +11,17 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationInfo, field_validator
+from pydantic import Field
 
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
 
-__all__ = ["GAUSS", "Mortar", "MortarVoid", "bed_factors"]
+__all__ = ["GAUSS", "Mortar", "MortarVoid", "bed_factors", "check_void"]
 
 GAUSS = 4
-"""Gauss points a direction: N^T N of the ACM shapes has degree 6 in x and in y, four points integrate 7."""
+"""Gauss points per direction: N^T N of the ACM shapes has degree 6 in x and in y, four points integrate 7."""
+
+TOLERANCE = 1e-9  # m, for the rounding of edges
 
 
 class Mortar(Params):
@@ -41,37 +43,21 @@ class Mortar(Params):
 
 
 class MortarVoid(Params):
-    """Rectangle of one slab under which the bed is weaker, missing or (factor > 1) stiffer.
+    """A rectangle of one slab whose bed is missing or scaled.
 
-    Attributes:
-        slab: Index of the slab along the track, from 0.
-        x_from: Beginning, from the slab's rear edge.
-        x_to: End, from the slab's rear edge.
-        y_from: Left edge, from the slab's centre line, positive to the right.
-        y_to: Right edge, from the slab's centre line.
-        factor: What k_m and c_m (and the lateral bed) are multiplied with; 0 is a void.
+    x is measured from the slab's rear edge, y from its centre line, positive to the right.
     """
 
-    slab: Annotated[int, Q("-", ge=0)]
-    x_from: Annotated[float, Q("m", ge=0.0)]
-    x_to: Annotated[float, Q("m")]
-    y_from: Annotated[float, Q("m")]
-    y_to: Annotated[float, Q("m")]
-    factor: Annotated[float, Q("-", ge=0.0, le=10.0)] = 0.0
-
-    @field_validator("x_to", "y_to")
-    @classmethod
-    def _ends_after_it_begins(cls, value: float, info: ValidationInfo) -> float:
-        begin = str(info.field_name).replace("to", "from")
-        if begin in info.data and value <= info.data[begin]:
-            raise ValueError(f"must be greater than {begin} = {info.data[begin]:g} m")
-        return value
+    slab: Annotated[int, Q("-", "slab i lies between i and i + 1 slab pitches", ge=0)]
+    x: Annotated[tuple[float, float], Field(description="from, to", json_schema_extra={"unit": "m"})]
+    y: Annotated[tuple[float, float], Field(description="from, to", json_schema_extra={"unit": "m"})]
+    factor: Annotated[float, Q("-", "0 void, 1 sound; scales stiffness and damping", ge=0, le=10)] = 0.0
 
 
 def bed_factors(
     length: float, width: float, elements: tuple[int, int], voids: Sequence[MortarVoid]
 ) -> NDArray[np.float64]:
-    """Bed factor at every quadrature point of one slab.
+    """Compute the bed factor at every quadrature point of one slab.
 
     An element's quadrature points own cells whose sides are the Gauss weights, so the cells tile the slab. A
     point's factor is 1 - sum (1 - factor) (share of its cell under the void): the area and the total
@@ -87,21 +73,21 @@ def bed_factors(
         Factors, shape (elements, GAUSS^2), element ex n_y + ey, point GAUSS qx + qy.
 
     Raises:
-        InputError: If a void leaves the slab or overlaps another one.
+        InputError: A void extends beyond the slab or overlaps another one.
     """
     for i, void in enumerate(voids):
-        _check(void, length, width, voids[:i])
+        check_void(void, length, width, voids[:i], f"mortar void on slab {void.slab}")
     factor = np.ones((elements[0], GAUSS, elements[1], GAUSS))
     for void in voids:
-        share_x = _shares(elements[0], length, void.x_from, void.x_to)
-        share_y = _shares(elements[1], width, void.y_from + width / 2.0, void.y_to + width / 2.0)
+        share_x = _shares(elements[0], length, *void.x)
+        share_y = _shares(elements[1], width, void.y[0] + width / 2.0, void.y[1] + width / 2.0)
         factor -= (1.0 - void.factor) * share_x[:, :, None, None] * share_y
     # voids that touch within a cell may leave a rounding error below zero
     return np.maximum(factor.transpose(0, 2, 1, 3), 0.0).reshape(-1, GAUSS**2)
 
 
 def _shares(elements: int, size: float, begin: float, end: float) -> NDArray[np.float64]:
-    """Share of every point's cell between two places from the slab's edge [m], shape (elements, GAUSS)."""
+    """Share of the cell of every point between two distances from the slab edge [m], shape (elements, GAUSS)."""
     weight = np.polynomial.legendre.leggauss(GAUSS)[1] / 2.0
     within = np.append(0.0, np.cumsum(weight[:-1]))
     left = size / elements * (np.arange(elements)[:, None] + within).ravel()
@@ -111,19 +97,30 @@ def _shares(elements: int, size: float, begin: float, end: float) -> NDArray[np.
     return share.reshape(elements, GAUSS)
 
 
-def _check(void: MortarVoid, length: float, width: float, others: Sequence[MortarVoid]) -> None:
-    """Refuse a void that leaves its slab or overlaps another one (1 nm of rounding is forgiven)."""
-    name = f"mortar void on slab {void.slab}"
-    if void.x_to > length + 1e-9:
-        raise InputError(f"{name}: x_to = {void.x_to:g}: must be <= the slab's length, {length:g} m")
-    for key, y in (("y_from", void.y_from), ("y_to", void.y_to)):
-        if abs(y) > width / 2.0 + 1e-9:
-            raise InputError(f"{name}: {key} = {y:g}: must be within half the slab's width, {width / 2.0:g} m")
+def check_void(void: MortarVoid, length: float, width: float, others: Sequence[MortarVoid], name: str) -> None:
+    """Refuse a void that extends beyond its slab or overlaps another one (1 nm is allowed for rounding).
+
+    Args:
+        void: The void.
+        length: Length of the slab [m].
+        width: Width of the slab [m].
+        others: Other voids; those of other slabs are ignored.
+        name: Name of the void in the message.
+
+    Raises:
+        InputError: Names the key, its value and the rule.
+    """
+    for key, span, low, high in (("x", void.x, 0.0, length), ("y", void.y, -width / 2.0, width / 2.0)):
+        if not low - TOLERANCE <= span[0] < span[1] <= high + TOLERANCE:
+            side = "length" if key == "x" else "width"
+            rule = f"must be [from, to] with {low:g} <= from < to <= {high:g} m (the slab's {side})"
+            raise InputError(f"{name}.{key} = {list(span)}: {rule}")
     for other in others:
-        overlap_x = min(void.x_to, other.x_to) - max(void.x_from, other.x_from)
-        overlap_y = min(void.y_to, other.y_to) - max(void.y_from, other.y_from)
-        if other.slab == void.slab and overlap_x > 1e-9 and overlap_y > 1e-9:
+        overlap_x, overlap_y = (
+            min(mine[1], its[1]) - max(mine[0], its[0]) for mine, its in ((void.x, other.x), (void.y, other.y))
+        )
+        if other.slab == void.slab and min(overlap_x, overlap_y) > TOLERANCE:
             raise InputError(
-                f"{name}: x_from = {void.x_from:g}: overlaps the void from x = {other.x_from:g} to "
-                f"{other.x_to:g} m; voids of a slab must not overlap"
+                f"{name}.x = {list(void.x)}: overlaps the void from x = {other.x[0]:g} to {other.x[1]:g} m;"
+                " voids of a slab must not overlap"
             )

@@ -1,6 +1,6 @@
-"""Shapes of a slab's plate elements at any of its points.
+"""Shape functions of the plate elements at any point of a slab.
 
-Places are measured from the slab's centre, x forward, y to the right. DOFs as in :mod:`tiengine.track.slab`.
+Coordinates are measured from the slab's centre, x forward, y to the right. DOFs as in :mod:`tiengine.track.slab`.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from tiengine.track.slab import Slab
 __all__ = ["WX", "WXX", "WXY", "WY", "WYY", "W", "element_dofs", "locate", "shapes_at", "tabulate_shapes"]
 
 W, WX, WY, WXX, WYY, WXY = range(6)
-"""Rows of a table of shapes: deflection and its derivatives by x and y."""
+"""Rows of a shape table: deflection and its derivatives by x and y."""
 
 
 def tabulate_shapes(slab: Slab, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Shapes and their derivatives at points of an element.
+    """Tabulate shape functions and their derivatives at points of an element.
 
     Args:
-        slab: Gives the element's size.
+        slab: Slab with its mesh.
         points: Local coordinates -1...1, shape (points, 2).
 
     Returns:
@@ -34,7 +34,7 @@ def tabulate_shapes(slab: Slab, points: NDArray[np.float64]) -> NDArray[np.float
 
 
 def element_dofs(slab: Slab) -> NDArray[np.int32]:
-    """DOFs of every element, shape (n_el, 12)."""
+    """Return the DOFs of every element, shape (n_el, 12)."""
     ex, ey = np.divmod(np.arange(slab.elements_x * slab.elements_y), slab.elements_y)
     corner = ex * (slab.elements_y + 1) + ey
     nodes = corner[:, None] + np.array([0, 1, slab.elements_y + 1, slab.elements_y + 2])
@@ -42,9 +42,9 @@ def element_dofs(slab: Slab) -> NDArray[np.int32]:
     return dofs
 
 
-def locate(place: NDArray[np.float64], size: float, elements: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Element and local coordinate (-1...1) of places in a row of elements, from its centre [m]."""
-    along = (place / size + 0.5) * elements
+def locate(distance: NDArray[np.float64], size: float, elements: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Find element and local coordinate (-1...1) of distances from the centre of a row of elements [m]."""
+    along = (distance / size + 0.5) * elements
     element: NDArray[np.int64] = np.clip(along.astype(np.int64), 0, elements - 1)
     return element, 2.0 * (along - element) - 1.0
 
@@ -52,7 +52,7 @@ def locate(place: NDArray[np.float64], size: float, elements: int) -> tuple[NDAr
 def shapes_at(
     slab: Slab, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Shapes at places of a slab.
+    """Evaluate shape functions at points of a slab.
 
     Args:
         slab: The slab.
@@ -60,7 +60,7 @@ def shapes_at(
         y: From its centre line, to the right [m], shape (n,).
 
     Returns:
-        DOFs of the element at every place, shape (n, 12), and rows ``W``, ``WX``, ... of its shapes there, shape
+        DOFs of the element at every point, shape (n, 12), and rows ``W``, ``WX``, ... of its shapes there, shape
         (n, 6, 12).
     """
     ex, xi = locate(x, slab.length, slab.elements_x)

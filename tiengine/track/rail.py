@@ -2,7 +2,7 @@
 
 Trial functions on the window 0 <= s <= l: sin(k_i s) for v, w, theta_x and cos(k_i s) for theta_y, theta_z, with
 k_i = i pi / l, i = 1..N. The inertia of a field of mass density mu is mu (d2u/dt2 - 2 V du'/dt + V^2 u'' - dV/dt u'),
-projected in this strong form, so that the cosine fields carry the flux through the window's ends.
+projected in this strong form, so that the cosine fields include the flux through the ends of the window.
 
 Symbols: w, v vertical and lateral displacement; theta_y, theta_z slopes of the section (shear strains w' - theta_y,
 v' - theta_z); theta_x torsion; EI, kappa G A, GK stiffnesses. Torsion has the St Venant constant GK, not G (Iy + Iz).
@@ -24,7 +24,7 @@ __all__ = ["Rail", "RailWindow", "sine_products"]
 
 
 class Rail(Params):
-    """Section and material of a rail; y is its lateral axis, z the vertical one."""
+    """Section and material of a rail; y is the lateral axis, z the vertical axis."""
 
     name: Name = "rail"
     source: Source = ""
@@ -52,7 +52,7 @@ class Rail(Params):
 
 
 def sine_products(modes: int) -> NDArray[np.float64]:
-    """Products G_ij = int W_i W_j' ds, independent of the window's length.
+    """Compute the products G_ij = int W_i W_j' ds, independent of the window's length.
 
     Returns:
         For sin(k_i s): 2 i j / (i^2 - j^2); for cos(k_i s): 2 j^2 / (i^2 - j^2); zero for i + j even. Shape (2, N, N).
@@ -66,7 +66,7 @@ def sine_products(modes: int) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class RailWindow:
-    """Matrices of one rail in a window of length l with N modes a field.
+    """Matrices of one rail in a window of length l with N modes per field.
 
     Attributes:
         rail: Section.
@@ -109,10 +109,10 @@ class RailWindow:
 
     @property
     def missing_compliance(self) -> NDArray[np.float64]:
-        """Static compliance that the modes left out would give a point under its own load, averaged over the window.
+        """Static compliance of the truncated modes at a point under its own load, averaged over the window.
 
         In w and v [m/N] (2/l) sum over i > N of 1/2 [1/(kappa G A k_i^2) + 1/(EI k_i^4)], in theta_x [rad/(N m)] the
-        same of 1/(GK k_i^2); the supports are soft against waves so short. Shape (3,), order w, v, theta_x.
+        same with 1/(GK k_i^2); the supports are soft against waves as short as these. Shape (3,), order w, v, theta_x.
         """
         r, n = self.rail, self.modes
         k1 = np.pi / self.length
@@ -123,23 +123,23 @@ class RailWindow:
         return missing
 
     def vertical(self, V: float, V_rate: float = 0.0) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
-        """M, C, K of (w, theta_y) at speed V [m/s] and rate V_rate [m/s^2]; each (2N, 2N)."""
+        """Return M, C, K of (w, theta_y) at speed V [m/s] and rate V_rate [m/s^2]; each (2N, 2N)."""
         s = self.modal_stiffness
         K = _two_fields(s[:, 0], s[:, 1], s[:, 2])
         return self._moving(K, (0, 1), (0, 1), V, V_rate)
 
     def lateral(self, V: float, V_rate: float = 0.0) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
-        """M, C, K of (v, theta_z, theta_x) at speed V [m/s] and rate V_rate [m/s^2]; each (3N, 3N)."""
+        """Return M, C, K of (v, theta_z, theta_x) at speed V [m/s] and rate V_rate [m/s^2]; each (3N, 3N)."""
         s = self.modal_stiffness
         K = sp.block_diag([_two_fields(s[:, 3], s[:, 4], s[:, 5]), sp.diags_array(s[:, 6])])
         return self._moving(K, (2, 3, 4), (0, 1, 0), V, V_rate)
 
     def shape(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """sin(k_i s), shape (len(s), N)."""
+        """Evaluate sin(k_i s), shape (len(s), N)."""
         return np.sin(np.multiply.outer(s, self.wave_numbers))
 
     def shape_slope(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """d/ds of :meth:`shape` [1/m], shape (len(s), N)."""
+        """Evaluate d/ds of :meth:`shape` [1/m], shape (len(s), N)."""
         k = self.wave_numbers
         return k * np.cos(np.multiply.outer(s, k))
 

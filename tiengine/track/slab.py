@@ -1,4 +1,4 @@
-"""Track slabs: a thin free plate of ACM elements plus rigid lateral displacement and yaw.
+"""Track slab: a thin free plate of ACM elements with rigid lateral displacement and yaw.
 
 DOFs of a slab: (w, dw/dx, dw/dy) of every node, node (ix, iy) being number ix (elements_y + 1) + iy, then the
 lateral displacement y and the yaw psi of its centre. x forward, y right, w down; side index 0 left, 1 right.
@@ -14,18 +14,16 @@ from typing import Annotated
 import numpy as np
 from pydantic import ValidationInfo, field_validator
 
+from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset, preset_names
 from tiengine.parameters.quantity import Params, Q, build
 from tiengine.track.mortar import Mortar
 
-__all__ = ["GRAVITY", "Slab", "load_slab", "slab_names"]
+__all__ = ["Slab", "load_slab", "slab_names"]
 
-GRAVITY = 9.81
-"""Acceleration of gravity [m/s^2]."""
-
-MOST_DOFS = 5000  # of a slab: its matrices are full
+MOST_DOFS = 5000  # per slab, since its matrices are full
 THIN = 0.1
 """Largest thickness over length or width of a thin plate (the source paper, section 2.1.2)."""
 
@@ -34,14 +32,14 @@ class Slab(Params):
     """Geometry, material and mesh of one slab.
 
     Attributes:
-        name: What the slab is called.
-        source: Where its numbers come from.
+        name: Name of the slab.
+        source: Source of the values.
         length: Length along the track.
         width: Width across the track.
         thickness: Thickness h.
         gap: Joint between two slabs.
         fastening_pitch: Seat spacing d, uniform across the joints.
-        fastenings: Pairs of fastenings a slab; fastenings d is the pitch of the slabs.
+        fastenings: Pairs of fastenings per slab; fastenings times d is the slab pitch.
         E: Young's modulus.
         nu: Poisson's ratio.
         rho: Density.
@@ -70,7 +68,7 @@ class Slab(Params):
     def _is_thin(cls, value: float, info: ValidationInfo) -> float:
         side = min(info.data.get("length", np.inf), info.data.get("width", np.inf))
         if value > THIN * side:
-            raise ValueError(f"must be at most {THIN:g} of length and width for a thin plate, {THIN * side:g} m")
+            raise ValueError(f"must be at most {THIN:g} times length and width for a thin plate, {THIN * side:g} m")
         return value
 
     @field_validator("fastenings")
@@ -78,7 +76,7 @@ class Slab(Params):
     def _seats_are_uniform(cls, value: int, info: ValidationInfo) -> int:
         known = info.data
         if not {"length", "gap", "fastening_pitch"} <= known.keys():
-            return value  # one of them has been refused already
+            return value  # one of them is already refused
         pitch = known["length"] + known["gap"]
         if abs(value * known["fastening_pitch"] - pitch) > 1e-6:
             raise ValueError(
@@ -109,6 +107,15 @@ class Slab(Params):
         """Distance between joints, length + gap [m]."""
         return self.length + self.gap
 
+    def slots(self, window: float, cover: bool) -> int:
+        """Slabs to keep in memory under a window: the paper's Eq. (16), or all that a moving window can touch.
+
+        Args:
+            window: Length [m].
+            cover: One slab more than the paper's count, so that every seat of the window stands on one.
+        """
+        return int(np.floor(window / self.pitch)) + (2 if cover else 1)
+
     @property
     def mass(self) -> float:
         """Mass of the slab [kg]."""
@@ -126,17 +133,17 @@ class Slab(Params):
 
     @property
     def plate_dofs(self) -> int:
-        """DOFs of the plate, three a node."""
+        """DOFs of the plate, three per node."""
         return 3 * (self.elements_x + 1) * (self.elements_y + 1)
 
 
 def slab_names() -> list[str]:
-    """Names of the library's slabs, sorted."""
+    """List the slabs of the library, sorted."""
     return preset_names("slabs")
 
 
 def load_slab(name_or_path: str, folder: Path | None = None) -> tuple[Slab, Mortar]:
-    """Slab and mortar of the library or of a TOML file of the same form.
+    """Load slab and mortar of the library or of a TOML file of the same form.
 
     Args:
         name_or_path: ``"CRTS_III"``, or the path of a file: keys of :class:`Slab` and a table ``[mortar]``.
@@ -152,5 +159,5 @@ def load_slab(name_or_path: str, folder: Path | None = None) -> tuple[Slab, Mort
     table = load_toml(path)
     mortar = table.pop("mortar", None)
     if not isinstance(mortar, dict):
-        raise InputError(f"{path.stem}.mortar: missing; a table of the bed's values is required")
+        raise InputError(f"{path.stem}.mortar: missing; must be a table of the values of the bed")
     return build(Slab, table, path.stem), build(Mortar, mortar, f"{path.stem}.mortar")

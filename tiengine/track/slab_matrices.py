@@ -1,4 +1,4 @@
-"""Matrices of a slab and its bed, and the different slabs of a track; needs Taichi for the plate elements."""
+"""Matrices of a slab with its bed, and the slab designs of a track; the plate elements need Taichi."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tiengine.track.slab import Slab
 class SlabMatrices:
     """Matrices and tables of one slab design, that is one arrangement of voids.
 
-    It has n DOFs, n_el elements and n_q quadrature points an element.
+    It has n DOFs, n_el elements and n_q quadrature points per element.
 
     Attributes:
         n: DOFs: the plate's, then lateral displacement and yaw.
@@ -27,7 +27,7 @@ class SlabMatrices:
         K_plate: Stiffness of the plate, shape (n, n); zero for lateral displacement and yaw.
         K_bed: Stiffness of the bed, lateral bed included, shape (n, n).
         C_bed: Damping of the bed, lateral bed included, shape (n, n).
-        seat_index: DOFs of the element under every seat, shape (fastenings, 2, 12).
+        seat_index: DOFs of the element at every seat, shape (fastenings, 2, 12).
         seat_w: Shapes: w at a seat is seat_w . u[seat_index], shape (fastenings, 2, 12).
         seat_slope: dw/dy at a seat is seat_slope . u[seat_index] [1/m for the w DOFs], shape (fastenings, 2,
             12).
@@ -56,7 +56,7 @@ class SlabMatrices:
 
 
 def slab_matrices(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid] = ()) -> SlabMatrices:
-    """Matrices of one slab.
+    """Compute the matrices of one slab.
 
     Args:
         slab: The slab.
@@ -67,7 +67,7 @@ def slab_matrices(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid] = ()) 
         The matrices and tables.
 
     Raises:
-        InputError: If a void leaves the slab, overlaps another, or belongs to another slab than the first
+        InputError: A void extends beyond the slab, overlaps another, or belongs to another slab than the first
             one.
     """
     if len({void.slab for void in voids}) > 1:
@@ -76,7 +76,7 @@ def slab_matrices(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid] = ()) 
 
 
 def slab_designs(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid]) -> tuple[list[SlabMatrices], dict[int, int]]:
-    """Matrices of the intact slab and of every slab with voids.
+    """Compute the matrices of the intact slab and of every slab with voids.
 
     Args:
         slab: The slab.
@@ -87,7 +87,7 @@ def slab_designs(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid]) -> tup
         The designs, the intact one first, and the design of each slab index that has voids.
 
     Raises:
-        InputError: If a void leaves its slab or overlaps another one.
+        InputError: A void extends beyond its slab or overlaps another one.
     """
     damaged = sorted({void.slab for void in voids})
     groups: list[list[MortarVoid]] = [[]]
@@ -96,7 +96,7 @@ def slab_designs(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid]) -> tup
 
 
 def _build(slab: Slab, mortar: Mortar, groups: list[list[MortarVoid]]) -> list[SlabMatrices]:
-    """One design for each group of voids."""
+    """Build one design for each group of voids."""
     elements = (slab.elements_x, slab.elements_y)
     points, weight = _quadrature(slab)
     table = tabulate_shapes(slab, points)
@@ -138,7 +138,7 @@ def _build(slab: Slab, mortar: Mortar, groups: list[list[MortarVoid]]) -> list[S
 
 
 def _quadrature(slab: Slab) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Local coordinates (GAUSS^2, 2) and areas [m^2] of the quadrature points of an element."""
+    """Return local coordinates (GAUSS^2, 2) and areas [m^2] of the quadrature points of an element."""
     x, w = np.polynomial.legendre.leggauss(GAUSS)
     points = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
     area = slab.length * slab.width / (slab.elements_x * slab.elements_y)
@@ -148,7 +148,7 @@ def _quadrature(slab: Slab) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _assemble(
     slab: Slab, table: NDArray[np.float64], weight: NDArray[np.float64], factor: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Stiffness, mass and integral of factor N^T N of every design, shape (n_design, n, n) each."""
+    """Assemble stiffness, mass and integral of factor N^T N of every design, shape (n_design, n, n) each."""
     h = slab.thickness
     section = np.tile([slab.rigidity, slab.nu, slab.rho * h, slab.rho * h**3 / 12.0], (len(factor), 1))
     element = np.zeros((3, *factor.shape[:2], 12, 12))
@@ -176,7 +176,7 @@ def _lateral_bed(
 def _seats(
     slab: Slab,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """DOFs, w row, dw/dy row and place of every seat; seat j is (j + 1/2) d past the joint's middle."""
+    """DOFs, w row, dw/dy row and x of every seat; seat j lies (j + 1/2) d beyond the centre of the joint."""
     seat_x = np.arange(0.5, slab.fastenings, dtype=np.float64) * slab.fastening_pitch - slab.pitch / 2.0
     seat_y = slab.seat_half_spacing * np.array([-1.0, 1.0])
     x, y = np.meshgrid(seat_x, seat_y, indexing="ij")
@@ -196,13 +196,13 @@ def _weight_pressure(
 ) -> NDArray[np.float64]:
     """Pressure of the linear bed under the slab's own weight [Pa], shape (n_el, n_q).
 
-    rho g h everywhere on an intact bed. Beside a void it is larger: the slab spans the void.
+    It is rho g h everywhere on an intact bed, and larger next to a void, since the slab spans the void.
     """
     if np.all(factor == 1.0):
         return np.full(factor.shape, slab.weight_pressure)
     element_load = slab.weight_pressure * (weight @ shape)
     load = np.bincount(index.ravel(), np.tile(element_load, len(index)))
-    # least squares, since a bed with too little area left does not hold the slab at all
+    # least squares: a bed with too little area left leaves the stiffness singular
     w = np.linalg.lstsq(K[:-2, :-2], load, rcond=None)[0]
     pressure: NDArray[np.float64] = mortar.stiffness * factor * np.einsum("ei,qi->eq", w[index], shape)
     return pressure

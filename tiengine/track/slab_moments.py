@@ -1,14 +1,14 @@
-"""Bending moments of a slab from its coordinates.
+"""Bending moments of a slab from its DOFs.
 
     M_x = -D (w,xx + nu w,yy)        M_y = -D (w,yy + nu w,xx)        [N m/m]
 
 with w positive down and D the plate's rigidity: a moment is positive where it stretches the underside. M_x bends the
 slab along the track (stress in x), M_y across it.
 
-They are taken at the 2 x 2 Gauss points of every element, where the second derivatives of its polynomial come closest
-to those of the exact field (Barlow 1976: a cubic that meets its ends' values and slopes has the second derivative of a
-quartic at these points and nowhere else). The error falls at least with the square of the element's size there. At the
-nodes it is four to ten times as large, averaged over the elements that meet there
+They are evaluated at the 2 x 2 Gauss points of every element, where the second derivatives of its polynomial are
+closest to those of the exact field (Barlow 1976: a cubic that matches values and slopes at its ends has the second
+derivative of a quartic at these points only). The error falls at least with the square of the element size there. At
+the nodes it is four to ten times as large, averaged over the elements that meet there
 (``tests/track/test_slab_moments.py``).
 
 Under a point load the moment of a thin plate grows without bound (like a logarithm): at the fastenings the moment is
@@ -32,7 +32,7 @@ GAUSS_POINTS = np.array([[x, y] for x in (-1.0, 1.0) for y in (-1.0, 1.0)]) / np
 
 
 def moment_operator(slab: Slab, points: NDArray[np.float64] = GAUSS_POINTS) -> NDArray[np.float64]:
-    """Slab coordinates to bending moments.
+    """Build the operator from slab DOFs to bending moments.
 
     Args:
         slab: The slab.

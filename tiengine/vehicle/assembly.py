@@ -1,20 +1,20 @@
-"""The equations of a train with the bodies' longitudinal motion still in them (MODEL §4).
+"""Equations of motion of a train including the longitudinal motion of its bodies (MODEL §4).
 
-Every body has six motions here (x, y, z, roll, pitch, yaw); :mod:`tiengine.vehicle.train` strikes out x. Each
+Every body has six motions here (x, y, z, roll, pitch, yaw); :mod:`tiengine.vehicle.train` eliminates x. Each
 connector contributes B' k B and B' c B with B its elongation by the motions. A damper's initial slope and a
-stop's stand in C and K; the kernel of :mod:`tiengine.kernels.suspension` adds the deviation of its table from
+stop's are part of C and K; the kernel of :mod:`tiengine.kernels.suspension` adds the deviation of its table from
 that slope.
 
 Longitudinal inertia. Bodies have no longitudinal coordinate, but under V(t) their inertia forces -m Vdot go
 to the wheelsets through the springs. Let x be the bodies' small longitudinal motions relative to the
 wheelsets. Quasi-statically K_xx x = -m Vdot - K_xu u. The part of x due to Vdot pushes the coordinates u with
 -K_ux x = K_ux K_xx^-1 m Vdot: moments that lift the nose when speed grows and lower it in braking. Each
-spring pushes both its bodies at the height halfway between its ends, so that push and counter-push leave no
-moment over. The part of x due to u is left out, as it is from K (no longitudinal degree of freedom).
+spring acts on both of its bodies at the mean height of its ends, so that force and reaction have no resultant
+moment. The part of x due to u is neglected, as in K (no longitudinal degree of freedom).
 
 Spin. A wheelset's pitch is measured from its spin -V/r0, J (pitch'' - Vdot/r0) = moment: hence +J Vdot/r0.
 
-Effort. What changes the speed acts at the axles (``"axles"``: creep forces carry only the wheelsets' spin),
+Effort. The force that changes the speed acts at the axles (``"axles"``: creep forces carry only the wheelsets' spin),
 or at the wheels' rims (``"wheels"``: every wheelset gets the torque -(m_s r0 + J/r0) Vdot and its frame the
 reaction, so that creep forces carry m_s Vdot with m_s its equal share of the vehicle's mass).
 """
@@ -31,13 +31,13 @@ from tiengine.parameters.errors import InputError
 from tiengine.vehicle.connector import Body, Damper, Direction, Joint, Spring, end_motion
 from tiengine.vehicle.vehicle import Vehicle
 
-__all__ = ["Assembly", "Element", "Placed", "longitudinal_push", "spin_push"]
+__all__ = ["Assembly", "Element", "PlacedBody", "longitudinal_push", "spin_push"]
 
 _AXES: dict[Direction, int] = {"x": 0, "y": 1, "z": 2}
 _FORCE_OF_RATE, _FORCE_OF_ELONGATION = 0, 1
 
 
-class Placed(NamedTuple):
+class PlacedBody(NamedTuple):
     """Body in the train: unique name, number of its vehicle, x from the first vehicle's centre [m]."""
 
     name: str
@@ -57,27 +57,27 @@ class Element(NamedTuple):
 
     @property
     def slope(self) -> float:
-        """Initial slope of the table, which stands in C or K [N s/m, N/m]."""
+        """Initial slope of the table, part of C or K [N s/m, N/m]."""
         return float(self.table[1, 1] / self.table[1, 0])
 
 
 class Assembly:
-    """Matrices over six motions a body, then the internal states of series springs.
+    """Matrices over six motions per body, followed by the internal states of series springs.
 
     Attributes:
         M: Mass, shape (size, size).
         C: Damping, likewise.
         K: Stiffness, likewise.
         K_push: Stiffness of the longitudinal springs with both ends at their middle height, likewise.
-        elements: What is nonlinear.
+        elements: Nonlinear elements.
     """
 
-    def __init__(self, bodies: Sequence[Placed], internal: int) -> None:
-        """Start from the bodies' inertia.
+    def __init__(self, bodies: Sequence[PlacedBody], internal: int) -> None:
+        """Initialise with the inertia of the bodies.
 
         Args:
             bodies: In the order of the coordinates.
-            internal: Number of internal states to come.
+            internal: Number of internal states of series springs.
         """
         self.bodies = bodies
         self.first_internal = self._next_internal = 6 * len(bodies)
@@ -95,7 +95,7 @@ class Assembly:
             vehicle: The vehicle.
             first: Its first body.
             series: Whether dampers with ``k_series`` get an internal state.
-            prefix: Put before the names of its elements.
+            prefix: Prefix of the names of its elements.
         """
         index = {body.name: first + i for i, body in enumerate(vehicle.body)}
         for spring in vehicle.spring:
@@ -113,7 +113,7 @@ class Assembly:
             self._add_element(self.K, prefix + stop.name, columns, row, _FORCE_OF_ELONGATION, stop.table)
 
     def _elongation(self, joint: Joint, index: dict[str, int]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Columns of both bodies (12,) and the six elongations by them (6, 12)."""
+        """Columns of both bodies (12,) and the derivatives of the six elongations by them (6, 12)."""
         a, b = index[joint.a], index[joint.b]
         columns = np.concatenate([6 * a + np.arange(6), 6 * b + np.arange(6)])
         motion_a = end_motion(self.bodies[a].body, joint.point_a)
@@ -123,7 +123,7 @@ class Assembly:
     def _add_damper(
         self, damper: Damper, prefix: str, columns: NDArray[np.intp], row: NDArray[np.float64], series: bool
     ) -> None:
-        """Damper over the elongation, or behind its series spring over an internal state s.
+        """Add a damper over the elongation or, behind its series spring, over an internal state s.
 
         The spring carries k (elongation - s), the damper F(s'); s has no mass.
         """
@@ -143,7 +143,7 @@ class Assembly:
         kind: int,
         table: NDArray[np.float64],
     ) -> None:
-        """Initial slope to the matrix; an element unless the law is that one straight line."""
+        """Add the initial slope to the matrix, and an element unless the law is one straight line."""
         element = Element(name, columns, row, kind, table)
         _add(matrix, columns, row, element.slope)
         if len(table) > 2:
@@ -151,7 +151,7 @@ class Assembly:
 
 
 def _levelled(spring: Spring) -> Spring:
-    """The spring with both ends at their middle height."""
+    """Copy of the spring with both ends at their mean height."""
     height = 0.5 * (spring.point_a[2] + spring.point_b[2])
     ends = {"point_a": (*spring.point_a[:2], height), "point_b": (*spring.point_b[:2], height)}
     return spring.model_copy(update=ends)
@@ -163,7 +163,7 @@ def _add(matrix: NDArray[np.float64], columns: NDArray[np.intp], row: NDArray[np
 
 
 def longitudinal_push(full: Assembly) -> NDArray[np.float64]:
-    """K_ux K_xx^-1 m, the push of the bodies' longitudinal inertia per unit Vdot.
+    """Compute K_ux K_xx^-1 m, the force of the longitudinal inertia of the bodies per unit Vdot.
 
     Args:
         full: The train.
@@ -172,23 +172,23 @@ def longitudinal_push(full: Assembly) -> NDArray[np.float64]:
         Generalised force [kg, kg m] on every motion, zero on the longitudinal ones, shape (size,).
 
     Raises:
-        InputError: No longitudinal spring carries a body's inertia to the wheelsets.
+        InputError: No longitudinal spring transmits the inertia of a body to the wheelsets.
     """
     sprung = np.array([6 * i for i, placed in enumerate(full.bodies) if not placed.body.wheelset], dtype=np.intp)
     mass = np.diag(full.M)[sprung]
     K_xx = full.K_push[np.ix_(sprung, sprung)]
     x = np.linalg.lstsq(K_xx, mass, rcond=None)[0] if len(sprung) else mass
-    lost = np.abs(K_xx @ x - mass)
-    if (lost > 1e-6 * mass.max(initial=0.0)).any():
-        name = full.bodies[sprung[np.argmax(lost)] // 6].name
-        raise InputError(f"{name}: no longitudinal spring (kx) carries its inertia to the wheelsets")
+    residual = np.abs(K_xx @ x - mass)
+    if (residual > 1e-6 * mass.max(initial=0.0)).any():
+        name = full.bodies[sprung[np.argmax(residual)] // 6].name
+        raise InputError(f"{name}: no longitudinal spring (kx) transmits its inertia to the wheelsets")
     push = full.K_push[:, sprung] @ x
     push[0 : full.first_internal : 6] = 0.0
     return np.asarray(push, dtype=np.float64)
 
 
 def spin_push(full: Assembly, vehicles: Sequence[Vehicle], effort: str) -> NDArray[np.float64]:
-    """Pitch moments per unit Vdot on wheelsets and, with the effort at the wheels, on their frames.
+    """Compute pitch moments per unit Vdot on wheelsets and, with the effort at the wheels, on their frames.
 
     Args:
         full: The train.

@@ -1,8 +1,8 @@
-"""The compact form of a vehicle: a coach on two bogies, written the way vehicle data sheets are.
+"""Compact form of a vehicle: a coach on two bogies, in the terms of vehicle data sheets.
 
-Stiffness and damping are per axle box (8) and per air spring (4); yaw and lateral dampers are two a bogie
-each. :func:`expand` turns it into the bodies car, frame 1 and 2, wheelset 1 ... 4 and the connectors
-between them. Where a data sheet leaves out the height of an element's ends, its class says what is taken.
+Stiffness and damping are per axle box (8) and per air spring (4); there are two yaw and two lateral
+dampers per bogie. :func:`expand` turns it into the bodies car, frame 1 and 2, wheelset 1 ... 4 and the connectors
+between them. Where a data sheet omits the heights of the ends of an element, its class states the default.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
+from tiengine.parameters.conventions import SIDES
 from tiengine.parameters.quantity import Name, Params, Q, Source
 from tiengine.vehicle.connector import (
     Body,
@@ -33,7 +34,7 @@ __all__ = ["Coach", "expand"]
 _Span = Annotated[float, Q("m", gt=0)]
 _Height = Annotated[float, Q("m", "above the rail", gt=0)]
 _Rates = tuple[Annotated[float, Q("m/s", ge=0)], ...]
-_SIDES = ((-1.0, "left"), (1.0, "right"))
+_SIDES = ((-1.0, SIDES[0]), (1.0, SIDES[1]))
 
 
 class Geometry(Params):
@@ -144,7 +145,7 @@ class Curve(Params):
 
     @property
     def law(self) -> dict[str, Any]:
-        """The keys that a :class:`~tiengine.connector.Damper` shares."""
+        """Keys shared with :class:`~tiengine.vehicle.connector.Damper`."""
         return {"v": self.v, "c": self.c, "F": self.F, "k_series": self.k_series}
 
 
@@ -152,19 +153,19 @@ class PrimaryDamper(Curve):
     """Vertical damper, per axle box.
 
     Attributes:
-        x_from_bogie_centre: Along the track; over the axle without it.
+        x_from_bogie_centre: Along the track; default: over the axle.
     """
 
     x_from_bogie_centre: _Span | None = None
 
 
 class YawDamper(Curve):
-    """Longitudinal damper, one a side and bogie.
+    """Longitudinal damper, one per side and bogie.
 
     Attributes:
         half_span: Lateral, from the centre line.
-        height_frame: Above the rail; the secondary springs' lower plane without it.
-        height_car: Above the rail; the secondary springs' upper plane without it.
+        height_frame: Above the rail; default: the lower plane of the secondary springs.
+        height_car: Above the rail; default: the upper plane of the secondary springs.
     """
 
     half_span: _Span
@@ -173,12 +174,12 @@ class YawDamper(Curve):
 
 
 class LateralDamper(Curve):
-    """Lateral damper, two a bogie, at +x and -x.
+    """Lateral damper, two per bogie, at +x and -x.
 
     Attributes:
         x_from_bogie_centre: Along the track.
-        height_frame: Above the rail; the secondary springs' lower plane without it.
-        height_car: Above the rail; the secondary springs' upper plane without it.
+        height_frame: Above the rail; default: the lower plane of the secondary springs.
+        height_car: Above the rail; default: the upper plane of the secondary springs.
     """
 
     x_from_bogie_centre: Annotated[float, Q("m", ge=0)] = 0.0
@@ -227,13 +228,13 @@ class AntiRoll(Params):
 
 
 class Coach(Params):
-    """A coach on two two-axle bogies, and extras in the general form.
+    """Coach on two two-axle bogies, with optional parts in the general form.
 
     Attributes:
-        body: Extra bodies.
-        spring: Extra springs.
-        damper: Extra dampers.
-        stop: Extra stops.
+        body: Additional bodies.
+        spring: Additional springs.
+        damper: Additional dampers.
+        stop: Additional stops.
     """
 
     name: Name
@@ -266,7 +267,7 @@ class Coach(Params):
 
 
 def expand(coach: Coach) -> dict[str, Any]:
-    """Bodies and connectors of a coach.
+    """Expand a coach to bodies and connectors.
 
     Args:
         coach: The compact form.
@@ -336,7 +337,7 @@ def _axle_box_parts(coach: Coach) -> Iterator[Spring | Damper]:
 
 
 def _bogie_parts(coach: Coach) -> Iterator[Spring | Damper | Stop]:
-    """What stands between the car and each frame."""
+    """Springs, dampers and stops between the car and each frame."""
     for frame, centre in _bogies(coach):
         yield from _secondary(coach, frame, centre)
         yield from _secondary_dampers(coach, frame, centre)
@@ -344,7 +345,7 @@ def _bogie_parts(coach: Coach) -> Iterator[Spring | Damper | Stop]:
 
 
 def _ends(a: str, b: str, x: float, y: float, upper: float, lower: float) -> dict[str, Any]:
-    """Two bodies and the ends of a connector, one above the other."""
+    """Bodies and ends of a connector, one end above the other."""
     return {"a": a, "b": b, "point_a": (x, y, upper), "point_b": (x, y, lower)}
 
 
@@ -366,7 +367,7 @@ def _secondary_dampers(coach: Coach, frame: str, centre: float) -> Iterator[Damp
             ends = _ends("car", frame, centre, side * yaw.half_span, *heights)
             yield Damper(name=f"{frame} {word} yaw damper", direction="x", **ends, **yaw.law)
         if lateral:
-            # Its force and elongation do not depend on y: one damper ahead of, one behind the bogie's centre.
+            # force and elongation do not depend on y: one damper ahead of the bogie centre, one behind it
             heights = lateral.height_car or upper, lateral.height_frame or lower
             ends = _ends("car", frame, centre - side * lateral.x_from_bogie_centre, 0.0, *heights)
             yield Damper(name=f"{frame} {word} lateral damper", direction="y", **ends, **lateral.law)

@@ -1,13 +1,13 @@
 """Bodies and the springs, dampers and stops between their points (MODEL §4).
 
 A vehicle is a list of rigid bodies with the motions (y, z, roll, pitch, yaw) and of connectors. A connector
-joins a point of body ``a`` to a point of body ``b``. Points are given in the vehicle: x forward from its
-centre, y right from the centre line, height above the rail. With (X, Y, Z) the same point seen from the
-body's centre of gravity (Z down), it moves by
+joins a point of body ``a`` to a point of body ``b``. Points are given in vehicle coordinates: x forward from its
+centre, y right from the centre line, height above the rail. With (X, Y, Z) the same point relative to the
+centre of gravity of the body (Z down), its displacement is
 
     u_x = Z pitch - Y yaw,   u_y = y + X yaw - Z roll,   u_z = z - X pitch + Y roll;
 
-an elongation is the motion of ``a`` less that of ``b``.
+an elongation is the displacement at ``a`` minus that at ``b``.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ __all__ = [
     "check_damper",
     "check_stop",
     "end_motion",
-    "prolonged",
+    "extend_table",
 ]
 
 Length = Annotated[float, Q("m")]
@@ -43,7 +43,9 @@ Damping = Annotated[float, Q("N s/m", ge=0)]
 RollStiffness = Annotated[float, Q("N m/rad", ge=0)]
 Forces = tuple[Annotated[float, Q("N", ge=0)], ...]
 Direction = Literal["x", "y", "z"]
-SeriesSprings = Annotated[bool, Field(description="springs in series with dampers (k_series) get states of their own")]
+SeriesSprings = Annotated[
+    bool, Field(description="springs in series with dampers (k_series) are modelled, with internal states")
+]
 
 
 VehicleClass = Literal["coach", "locomotive", "freight"]
@@ -53,7 +55,7 @@ VehicleClass = Literal["coach", "locomotive", "freight"]
 class Body(Params):
     """Rigid body with its principal axes along x, y, z; a wheelset spins."""
 
-    name: Annotated[str, Field(description="what connectors call it")]
+    name: Annotated[str, Field(description="name by which connectors refer to it")]
     mass: Annotated[float, Q("kg", "mass", gt=0)]
     Jx: Annotated[float, Q("kg m^2", "roll inertia", gt=0)]
     Jy: Annotated[float, Q("kg m^2", "pitch inertia; of a wheelset its spin inertia", gt=0)]
@@ -61,7 +63,7 @@ class Body(Params):
     x: Annotated[float, Q("m", "centre of gravity, forward of the vehicle's centre")] = 0.0
     y: Annotated[float, Q("m", "centre of gravity, right of the centre line")] = 0.0
     height: Annotated[float, Q("m", "centre of gravity above the rail", ge=0)]
-    wheelset: Annotated[bool, Field(description="it rolls on the rails and spins")] = False
+    wheelset: Annotated[bool, Field(description="rolls on the rails and spins")] = False
 
     def local(self, point: Point) -> tuple[float, float, float]:
         """(X, Y, Z) from the centre of gravity to a point of the vehicle (x, y, height) [m]."""
@@ -69,13 +71,13 @@ class Body(Params):
 
 
 class Joint(Params):
-    """What every connector has: two bodies and a point of each (x, y, height above the rail) [m]."""
+    """Ends of a connector: two bodies and a point of each (x, y, height above the rail) [m]."""
 
     name: Name = ""
     a: Annotated[str, Field(description="one body")]
     b: Annotated[str, Field(description="the other body")]
-    point_a: Annotated[Point, Field(description="where it holds a: x, y, height above the rail")]
-    point_b: Annotated[Point, Field(description="where it holds b: x, y, height above the rail")]
+    point_a: Annotated[Point, Field(description="attachment to a: x, y, height above the rail")]
+    point_b: Annotated[Point, Field(description="attachment to b: x, y, height above the rail")]
 
 
 class Spring(Joint):
@@ -110,7 +112,7 @@ class Spring(Joint):
 
     @property
     def damping(self) -> NDArray[np.float64]:
-        """Damping of the same [N s/m], shape (6,)."""
+        """Damping of the same elongations [N s/m], shape (6,)."""
         return np.array([self.cx, self.cy, self.cz, 0.0, 0.0, 0.0])
 
 
@@ -118,10 +120,10 @@ class Damper(Joint):
     """Damper along one direction, odd in its rate, optionally in series with a spring.
 
     Either slopes ``c[i]`` from the rates ``v[i]`` on (``v[0] = 0``), or points (v, F) from (0, 0) on. Beyond
-    the last point the last slope goes on: repeat the last force to saturate.
+    the last point the last slope continues: repeat the last force to saturate.
 
     Attributes:
-        direction: Along which it acts.
+        direction: Direction of its force.
         v: Rates.
         c: Slopes from these rates on.
         F: Forces at these rates.
@@ -151,10 +153,10 @@ class Damper(Joint):
 class Stop(Joint):
     """Spring along one direction, odd in its elongation, by points (x, F); no force below a gap x[0] > 0.
 
-    Beyond the last point the last slope goes on.
+    Beyond the last point the last slope continues.
 
     Attributes:
-        direction: Along which it acts.
+        direction: Direction of its force.
         x: Elongations.
         F: Forces at these elongations.
     """
@@ -176,7 +178,7 @@ class Stop(Joint):
 
 
 def check_damper(v: tuple[float, ...], c: tuple[float, ...], F: tuple[float, ...]) -> None:
-    """Refuse a damper table that is not a rising one of slopes or of points from zero on.
+    """Refuse a damper table that does not rise from zero.
 
     Args:
         v: Rates [m/s].
@@ -194,7 +196,7 @@ def check_damper(v: tuple[float, ...], c: tuple[float, ...], F: tuple[float, ...
 
 
 def check_stop(x: tuple[float, ...], F: tuple[float, ...]) -> None:
-    """Refuse a stop's table that is not a rising one from zero force on.
+    """Refuse a stop table that does not rise from zero force.
 
     Args:
         x: Elongations [m].
@@ -209,30 +211,30 @@ def check_stop(x: tuple[float, ...], F: tuple[float, ...]) -> None:
 
 
 def _check_points(key: str, values: tuple[float, ...], other: str, others: tuple[float, ...]) -> None:
-    """Refuse tables of unequal length or whose abscissae do not rise."""
+    """Refuse tables of unequal length or with abscissae that do not rise."""
     if not values or len(values) != len(others):
         raise ValueError(f"{key} and {other} must have the same length, one or more")
     if any(later <= earlier for earlier, later in pairwise(values)):
         raise ValueError(f"{key} must rise from point to point")
 
 
-def prolonged(table: NDArray[np.float64], points: int) -> NDArray[np.float64]:
-    """A force table with more points on the line of its last segment.
+def extend_table(table: NDArray[np.float64], points: int) -> NDArray[np.float64]:
+    """Extend a force table by points on the line of its last segment.
 
     Args:
         table: Points (abscissa, force), shape (n, 2), n >= 2.
-        points: Wanted points, at least n.
+        points: Number of points of the result, at least n.
 
     Returns:
         The same curve, shape (points, 2).
     """
     step = table[-1] - table[-2]
-    more = np.arange(1, points - len(table) + 1)[:, None]
-    return np.vstack([table, table[-1] + more * step])
+    count = np.arange(1, points - len(table) + 1)[:, None]
+    return np.vstack([table, table[-1] + count * step])
 
 
 def end_motion(body: Body, point: Point) -> NDArray[np.float64]:
-    """Motion of a point of a body, its longitudinal motion included.
+    """Matrix of the motion of a point of a body, longitudinal motion included.
 
     A wheelset's pitch is the perturbation of its spin; axle boxes do not follow it, so its column is zero.
 

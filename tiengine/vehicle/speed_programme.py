@@ -2,7 +2,7 @@
 
 Between the points of a table the kinetic energy T = V^2/2 is a C1 function of chainage (monotone cubic
 Hermite, Fritsch and Carlson 1980, the slope zero at both ends), so that the acceleration dV/dt = dT/dx is
-continuous; before the first and behind the last point V is constant.
+continuous; before the first and beyond the last point V is constant.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from tiengine.parameters.errors import InputError
 
 __all__ = ["SpeedProfile"]
 
-_LATTICE = 2**20  # positions per step of the lattice on which constant speed marches
+_LATTICE = 2**20  # lattice points per step; at constant speed positions lie on the lattice
 
 
 class SpeedProfile:
-    """Speed as a function of chainage, and the march along it in time."""
+    """Speed as a function of chainage, and its integration in time."""
 
     def __init__(self, chainage: Sequence[float], speed: Sequence[float]) -> None:
-        """Build from a table; one row is a constant speed.
+        """Build the profile from a table; a single row is a constant speed.
 
         Args:
             chainage: Chainages [m], increasing, shape (n,).
@@ -51,12 +51,12 @@ class SpeedProfile:
 
     @classmethod
     def constant(cls, V: float) -> SpeedProfile:
-        """One speed V [m/s] everywhere."""
+        """Profile of constant speed V [m/s]."""
         return cls([0.0], [V])
 
     @classmethod
     def table(cls, chainage: Sequence[float], speed: Sequence[float]) -> SpeedProfile:
-        """Speeds [m/s] at chainages [m]; see the constructor."""
+        """Profile through speeds [m/s] at chainages [m]; see the constructor."""
         return cls(chainage, speed)
 
     @property
@@ -76,7 +76,7 @@ class SpeedProfile:
         return sqrt(2.0 * (c0 + s * (c1 + s * (c2 + s * c3)))), c1 + s * (2.0 * c2 + s * 3.0 * c3)
 
     def advance(self, x0: float, dt: float, n: int) -> tuple[Reals, Reals, Reals]:
-        """March n steps; ``advance(2 n)`` is ``advance(n)`` twice to the last bit.
+        """Integrate n steps; ``advance(2 n)`` equals ``advance(n)`` twice, bit for bit.
 
         Constant speed: x0 + V t. A table: the classical Runge-Kutta rule for dx/dt = V(x).
 
@@ -92,37 +92,37 @@ class SpeedProfile:
             x = _lattice(float(x0), float(self.speed[0]) * dt, n)
             return x, np.full(n + 1, self.speed[0]), np.zeros(n + 1)
         x, V, Vdot = np.empty(n + 1), np.empty(n + 1), np.empty(n + 1)
-        at, here, half, sixth = self.at, float(x0), 0.5 * dt, dt / 6.0
+        at, position, half, sixth = self.at, float(x0), 0.5 * dt, dt / 6.0
         for i in range(n + 1):
-            k1, a = at(here)
-            x[i], V[i], Vdot[i] = here, k1, a
-            k2 = at(here + half * k1)[0]
-            k3 = at(here + half * k2)[0]
-            k4 = at(here + dt * k3)[0]
-            here += sixth * (k1 + 2.0 * (k2 + k3) + k4)
+            k1, a = at(position)
+            x[i], V[i], Vdot[i] = position, k1, a
+            k2 = at(position + half * k1)[0]
+            k3 = at(position + half * k2)[0]
+            k4 = at(position + dt * k3)[0]
+            position += sixth * (k1 + 2.0 * (k2 + k3) + k4)
         return x, V, Vdot
 
 
 def _energy_pieces(x: Reals, T: Reals) -> list[tuple[float, float, float, float, float]]:
-    """Start and coefficients c0...c3 of T = Sum c_i (x - start)^i before, between and behind the points."""
-    before, behind = (float(x[0]), float(T[0]), 0.0, 0.0, 0.0), (float(x[-1]), float(T[-1]), 0.0, 0.0, 0.0)
+    """Start and coefficients c0...c3 of T = Sum c_i (x - start)^i before, between and beyond the points."""
+    before, beyond = (float(x[0]), float(T[0]), 0.0, 0.0, 0.0), (float(x[-1]), float(T[-1]), 0.0, 0.0, 0.0)
     if x.size == 1:
-        return [before, behind]
+        return [before, beyond]
     slope = PchipInterpolator(x, T).derivative()(x)
     slope[[0, -1]] = 0.0
     h, rise = np.diff(x), np.diff(T) / np.diff(x)
     c2 = (3.0 * rise - 2.0 * slope[:-1] - slope[1:]) / h
     c3 = (slope[:-1] + slope[1:] - 2.0 * rise) / (h * h)
     table = np.stack([x[:-1], T[:-1], slope[:-1], c2, c3], axis=-1).tolist()
-    return [before, *(tuple(row) for row in table), behind]
+    return [before, *(tuple(row) for row in table), beyond]
 
 
 def _lattice(x0: float, step: float, n: int) -> Reals:
     """x0 + i step, i = 0...n, on the multiples of step/2^20.
 
-    Plain sums x0 + i step would depend on where a chunk begins. From a point of the lattice the multiple is
-    found again exactly, so these do not; a start beside the lattice is moved onto it after the first instant,
-    by less than step/2^21 (5e-9 m for steps of 1 cm). Good to 2^50 multiples, 1e7 m for such steps.
+    Plain sums x0 + i step would depend on where a chunk begins. These do not, since the multiple of a lattice point
+    is recovered exactly; a start off the lattice is moved onto it after the first instant, by less than
+    step/2^21 (5e-9 m for steps of 1 cm). Exact up to 2^50 multiples, 1e7 m for such steps.
     """
     unit = step / _LATTICE
     x: Reals = (round(x0 / unit) + _LATTICE * np.arange(n + 1)).astype(np.float64) * unit
@@ -131,5 +131,5 @@ def _lattice(x0: float, step: float, n: int) -> Reals:
 
 
 def _number(value: float) -> str:
-    """Shortest text of a number that was converted to another unit."""
+    """Format a number that was converted to another unit, without rounding noise."""
     return f"{value:.12g}"

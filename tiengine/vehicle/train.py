@@ -1,8 +1,8 @@
-"""Trains: the matrices of all vehicles together, and what their kernels need (MODEL §4).
+"""Trains: matrices of all vehicles together and the data of the suspension kernels (MODEL §4).
 
-Coordinates: five a body (y, z, roll, pitch, yaw), body after body, vehicle after vehicle; then the internal
-states of dampers in series with springs, if asked for. How connectors and the change of speed enter is told
-in :mod:`tiengine.vehicle.assembly`.
+Coordinates: five per body (y, z, roll, pitch, yaw), body after body, vehicle after vehicle; then the internal
+states of dampers in series with springs, where they are modelled. Connectors and the change of speed are
+described in :mod:`tiengine.vehicle.assembly`.
 
 Gyroscopic pair of a wheelset with spin -V/r0: roll moment -J V/r0 yaw', yaw moment +J V/r0 roll'; on the
 left-hand side V C_speed, skew. Products of perturbations (pitch' yaw', pitch' roll') are dropped.
@@ -22,19 +22,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
-from tiengine.vehicle.assembly import Assembly, Element, Placed, longitudinal_push, spin_push
-from tiengine.vehicle.connector import prolonged
+from tiengine.vehicle.assembly import Assembly, Element, PlacedBody, longitudinal_push, spin_push
+from tiengine.vehicle.connector import extend_table
 from tiengine.vehicle.vehicle import Vehicle
 
-__all__ = ["GRAVITY", "MOTIONS", "TrainModel", "assemble", "static_wheel_loads", "train_centres"]
+__all__ = ["MOTIONS", "TrainModel", "assemble", "centre_in_window", "static_wheel_loads", "train_centres"]
 
-GRAVITY = 9.81
-"""Acceleration of free fall [m/s^2]."""
 MOTIONS = ("y", "z", "roll", "pitch", "yaw")
 """Order of a body's coordinates."""
 
-_WIDTH = 12  # columns of an element's row: five of either body, and room
+_WIDTH = 12  # columns of an element row: five of either body and two unused
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -45,7 +44,7 @@ class TrainModel:
 
     Attributes:
         n_dof: Coordinates of the bodies, five each: y, z, roll, pitch, yaw.
-        n: ``n_dof`` and the internal states of series springs, which stand at the end.
+        n: ``n_dof`` and the internal states of series springs, which come last.
         M: Mass, shape (n, n), zero rows for internal states [kg, kg m^2].
         C: Damping, symmetric, shape (n, n).
         K: Stiffness, symmetric, shape (n, n).
@@ -63,7 +62,7 @@ class TrainModel:
         element_index: Coordinates of each nonlinear element, unused 0, shape (n_e, 12).
         element_row: Elongation = row . u, unused 0, shape (n_e, 12).
         element_kind: 0 force of the rate, 1 force of the elongation, shape (n_e,).
-        element_linear: Slope that already stands in C or K, shape (n_e,).
+        element_linear: Slope that is already part of C or K, shape (n_e,).
         element_table: Points (abscissa, force) of an odd law from zero on, shape (n_e, points, 2).
         element_names: Name of each element.
     """
@@ -92,12 +91,22 @@ class TrainModel:
     element_names: tuple[str, ...]
 
     def dof(self, body: str, motion: str) -> int:
-        """Index of a body's coordinate, e.g. ``dof("car", "z")``."""
+        """Return the index of a coordinate of a body, e.g. ``dof("car", "z")``."""
         return 5 * self.body_names.index(body) + MOTIONS.index(motion)
 
 
+def centre_in_window(window: float, wheelset_x: NDArray[np.float64]) -> float:
+    """Centre of the first vehicle from the rear end of a window that has the wheels in its middle [m].
+
+    Args:
+        window: Length [m].
+        wheelset_x: Wheelsets relative to the first vehicle's centre [m], shape (n_ws,).
+    """
+    return window / 2.0 - 0.5 * float(wheelset_x.max() + wheelset_x.min())
+
+
 def train_centres(vehicles: Sequence[Vehicle]) -> NDArray[np.float64]:
-    """Centres of coupled vehicles relative to the first's [m], backwards negative, shape (vehicles,)."""
+    """Return the centres of coupled vehicles relative to the first [m], backwards negative, shape (vehicles,)."""
     lengths = np.array([vehicle.length_over_couplers for vehicle in vehicles])
     return -np.append(0.0, np.cumsum(0.5 * (lengths[:-1] + lengths[1:])))
 
@@ -109,12 +118,12 @@ def assemble(
     series_springs: bool | None = None,
     effort: Literal["axles", "wheels"] = "axles",
 ) -> TrainModel:
-    """Matrices and nonlinear elements of a train.
+    """Assemble the matrices and nonlinear elements of a train.
 
     Args:
         vehicles: The leading one first.
-        centres: Centre of each vehicle relative to the first's, forward [m]; by the coupler lengths if None.
-        series_springs: Every damper with ``k_series`` gets an internal state; what each vehicle says if None.
+        centres: Centre of each vehicle relative to the first's, forward [m]; from the coupler lengths if None.
+        series_springs: Every damper with ``k_series`` gets an internal state; None: as each vehicle states.
         effort: Where the force that changes the speed acts.
 
     Returns:
@@ -149,7 +158,7 @@ def _check_centres(vehicles: Sequence[Vehicle], centres: NDArray[np.float64]) ->
         raise InputError(f"train.centres = {centres.tolist()}: must fall, the first vehicle leads")
 
 
-def _place(vehicles: Sequence[Vehicle], centres: NDArray[np.float64]) -> list[Placed]:
+def _place(vehicles: Sequence[Vehicle], centres: NDArray[np.float64]) -> list[PlacedBody]:
     """Bodies of the whole train, wheelsets numbered through it from the front."""
     placed = []
     wheelsets = 0
@@ -159,13 +168,13 @@ def _place(vehicles: Sequence[Vehicle], centres: NDArray[np.float64]) -> list[Pl
             name = body.name if len(vehicles) == 1 else f"v{k + 1} {body.name}"
             if body.wheelset:
                 name = f"wheelset {wheelsets + rank[body.x] + 1}"
-            placed.append(Placed(name, k, float(centre) + body.x, body))
+            placed.append(PlacedBody(name, k, float(centre) + body.x, body))
         wheelsets += len(rank)
     return placed
 
 
 def _reduce(full: Assembly, vehicles: Sequence[Vehicle], push: NDArray[np.float64]) -> TrainModel:
-    """Strike out the longitudinal motions and lay out what the engine reads."""
+    """Eliminate the longitudinal motions and arrange the data for the engine."""
     bodies = full.bodies
     keep = np.array([i for i in range(full.size) if i >= full.first_internal or i % 6])
     new = np.full(full.size, -1)
@@ -227,22 +236,22 @@ def _lay_out(
         count = np.count_nonzero(used)
         index[e, :count] = new[element.columns[used]]
         row[e, :count] = element.row[used]
-        table[e] = prolonged(element.table, points)
+        table[e] = extend_table(element.table, points)
     return index, row, table
 
 
 def static_wheel_loads(train: TrainModel, speed_rate: float = 0.0) -> NDArray[np.float64]:
-    """Wheel loads at rest with the wheelsets held, linear springs only.
+    """Compute wheel loads at rest with the wheelsets fixed, linear springs only.
 
     Args:
         train: The train.
-        speed_rate: Vdot [m/s^2] whose longitudinal inertia acts beside gravity.
+        speed_rate: Vdot [m/s^2] whose longitudinal inertia acts in addition to gravity.
 
     Returns:
         Load of the left and the right wheel of each wheelset [N], shape (n_ws, 2).
 
     Raises:
-        InputError: A body can move without resistance while the wheelsets are held.
+        InputError: A body can move without resistance while the wheelsets are fixed.
     """
     load = train.gravity + speed_rate * train.acceleration_force
     held = train.wheelset_dof.ravel()
@@ -250,18 +259,18 @@ def static_wheel_loads(train: TrainModel, speed_rate: float = 0.0) -> NDArray[np
     _check_held(train, free)
     u = np.zeros(train.n)
     u[free] = np.linalg.solve(train.K[np.ix_(free, free)], load[free])
-    support = load - train.K @ u  # on the wheelset from above: what the rails must take
+    support = load - train.K @ u  # on the wheelset from above, to be carried by the rails
     total, roll = support[train.wheelset_dof[:, 1]], support[train.wheelset_dof[:, 2]]
     half_difference = roll / (2.0 * train.half_spacing)
     return np.column_stack([0.5 * total - half_difference, 0.5 * total + half_difference])
 
 
 def _check_held(train: TrainModel, free: NDArray[np.intp]) -> None:
-    """Refuse bodies that springs leave free, by the smallest eigenvalue of K scaled to a unit diagonal."""
+    """Refuse bodies that the springs do not restrain, by the smallest eigenvalue of K scaled to a unit diagonal."""
     K = train.K[np.ix_(free, free)]
     stiffness = np.diag(K)
     scale = 1.0 / np.sqrt(np.where(stiffness > 0.0, stiffness, 1.0))
     values, vectors = np.linalg.eigh(scale[:, None] * K * scale)
     if len(free) and values[0] < 1e-10:
         dof = free[np.argmax(np.abs(vectors[:, 0]) * (free < train.n_dof))]
-        raise InputError(f"{train.body_names[dof // 5]}: springs leave it free to move, mostly in {MOTIONS[dof % 5]}")
+        raise InputError(f"{train.body_names[dof // 5]}: not restrained by springs, mostly in {MOTIONS[dof % 5]}")

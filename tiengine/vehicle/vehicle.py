@@ -55,7 +55,7 @@ class Vehicle(Params):
                         where = f"{self.name}.{kind}[{i}].{end} = {name!r}"
                         raise InputError(f"{where}: no such body{nearest(name, names)}")
         if not len(self.axle_positions):
-            raise InputError(f"{self.name}.body: one at least must be a wheelset")
+            raise InputError(f"{self.name}.body: at least one must be a wheelset")
         if any(body.wheelset and body.y != 0.0 for body in self.body):
             raise InputError(f"{self.name}.body: a wheelset must be on the centre line, y = 0")
         if not np.diff(self.axle_positions).all():
@@ -84,12 +84,12 @@ class Vehicle(Params):
 
 
 def vehicle_names() -> list[str]:
-    """Names of the vehicle presets of the library."""
+    """List the vehicle presets of the library."""
     return preset_names("vehicles")
 
 
 def load_vehicle(name_or_path: str, folder: Path | None = None) -> Vehicle:
-    """Vehicle of the library or of a TOML file of the same form.
+    """Load a vehicle of the library or of a TOML file of the same form.
 
     Args:
         name_or_path: ``"CRH380A_v2"``, or the path of a file.
@@ -106,7 +106,7 @@ def load_vehicle(name_or_path: str, folder: Path | None = None) -> Vehicle:
 
 
 def vehicle_from_table(table: Mapping[str, Any], where: str = "vehicle") -> Vehicle:
-    """Make a vehicle from the tables of a file.
+    """Build a vehicle from the tables of a file.
 
     Args:
         table: The file's content; with a ``geometry`` table a coach on two bogies, else a list of bodies.

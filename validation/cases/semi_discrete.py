@@ -1,9 +1,9 @@
 """The engine's semi-discrete equations as one first-order system, for general-purpose ODE solvers.
 
-Written with matrices, apart from the step and its kernels: linear parts from the host's M, C, K; fastenings as springs
-and dampers between a rail's shape at the moving seat and a slab's shape; only the wheel-rail contact and the nonlinear
-suspension elements are evaluated by the engine's kernels. y = (u, du/dt), u = (rails, slabs, vehicle), where a rail's
-coordinates are w, theta_y, v, theta_z, theta_x, N modes each.
+Written with matrices, independently of the step and its kernels: linear parts from the host's M, C, K; fastenings as
+springs and dampers between a rail's shape at the moving seat and a slab's shape; only the wheel-rail contact and the
+nonlinear suspension elements are evaluated by the engine's kernels. y = (u, du/dt), u = (rails, slabs, vehicle), where
+a rail's coordinates are w, theta_y, v, theta_z, theta_x, N modes each.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from tiengine.engine.equilibrium import ContactForces, evaluate_contact
-from tiengine.engine.state import State
+from tiengine.engine.sine_state import SineState
 from tiengine.irregularity.irregularity import Irregularity
 from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
@@ -30,13 +30,13 @@ class SemiDiscrete:
         """Assemble.
 
         Args:
-            model: Gives the matrices.
+            model: Source of the matrices.
             track: Irregularity.
             V: Speed [m/s].
             slabs: All slabs that the window touches, from its beginning to its end.
         """
         self.model, self.track, self.V, self.slabs = model, track, V, slabs
-        g = model.given
+        g = model.ingredients
         sound, train = g.designs.matrices[0], g.train
         rail = [
             la.block_diag(*(m.toarray() for m in pair))
@@ -56,7 +56,7 @@ class SemiDiscrete:
 
     def _seats(self) -> None:
         """The slabs' side of every fastening that can stand in the window, and stiffness and damping."""
-        g, sound = self.model.given, self.model.given.designs.matrices[0]
+        g, sound = self.model.ingredients, self.model.ingredients.designs.matrices[0]
         f, b = g.fastening, g.rail.half_base
         self.seats = np.arange(self.slabs.start * g.slab.fastenings, self.slabs.stop * g.slab.fastenings)
         self.on_slab = np.zeros((len(self.seats), 2, 3, self.n))
@@ -73,8 +73,8 @@ class SemiDiscrete:
 
     def shapes(self, t: float) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
         """Which seats stand in the window at time t, the rails' shape there and its rate -V d/ds."""
-        s = (self.seats + 0.5) * self.model.given.slab.fastening_pitch - self.V * t
-        here = (s > 0.0) & (s < self.model.given.length)
+        s = (self.seats + 0.5) * self.model.ingredients.slab.fastening_pitch - self.V * t
+        here = (s > 0.0) & (s < self.model.ingredients.length)
         k = self.model.window.wave_numbers
         return here, np.sin(np.outer(s[here], k)), -self.V * k * np.cos(np.outer(s[here], k))
 
@@ -97,7 +97,7 @@ class SemiDiscrete:
         return out
 
     def fastenings(self, t: float) -> tuple[NDArray[np.float64], ...]:
-        """As matrices: elongations E u, their rates E u' + F u; with k and c by row."""
+        """Fastenings as matrices: elongations E u, their rates E u' + F u; with k and c by row."""
         here, phi, rate = self.shapes(t)
         E = -self.on_slab[here]
         F, n = np.zeros_like(E), self.modes
@@ -122,7 +122,7 @@ class SemiDiscrete:
         return self._contact(t, u[self.dof][None], v[self.dof][None], self.under_wheels(u, v)[None])
 
     def _contact(self, t: float, *motion: NDArray[np.float64]) -> ContactForces:
-        felt = self.track.sample(self.V * t + self.model.wheel_s)
+        felt = self.track.sample(self.V * t + self.model.ingredients.wheel_s)
         return evaluate_contact(self.model, self.V, felt, *motion)
 
     def rhs(self, t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -143,7 +143,7 @@ class SemiDiscrete:
 
     def _on_vehicle(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Gravity, nonlinear suspension, gyroscopic pair of the pitch rates."""
-        train = self.model.given.train
+        train = self.model.ingredients.train
         motion = np.stack([u, v, train.gravity])
         suspension_forces(
             train.n, train.element_index, train.element_row, train.element_kind, train.element_linear,
@@ -182,7 +182,7 @@ class SemiDiscrete:
         return np.einsum("kwm->wmk", (force[:28] - force[28:]) / (2.0 * NUDGE)[:, None, None])
 
     def _inputs(self) -> list[NDArray[np.float64]]:
-        """What a wheelset's contact feels, as linear in u and in v; shape (2, 28, n) a wheelset."""
+        """Inputs of a wheelset's contact as linear functions of u and v, shape (2, 28, n) per wheelset."""
         out = []
         for w in range(len(self.dof)):
             rows = np.zeros((2, 28, self.n))
@@ -195,7 +195,7 @@ class SemiDiscrete:
             out.append(rows)
         return out
 
-    def pack(self, state: State) -> NDArray[np.float64]:
+    def pack(self, state: SineState) -> NDArray[np.float64]:
         """The y of an engine's state whose window begins at the first of the slabs."""
         halves = []
         for row in (at.U, at.V):

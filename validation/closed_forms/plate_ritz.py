@@ -25,7 +25,7 @@ def frequencies(
     degree: int,
     bed: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Natural frequencies, the three rigid modes included.
+    """Natural frequencies, including the three rigid modes.
 
     Args:
         length: L [m].

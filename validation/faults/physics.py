@@ -1,4 +1,4 @@
-"""Physics that goes wrong in one train of four: caught within a millisecond, named, and no matter to the others."""
+"""Diverging physics in one train of four: detected within a millisecond, named, without effect on the others."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recording.guards import LIMITS
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulation import simulate
-from tiengine.simulation import time_loop as march
+from tiengine.simulation import simulate, time_loop
 from validation.faults.contents import Contents, contents
 from validation.faults.plan import SEED
 from validation.faults.space import Check
@@ -31,18 +30,18 @@ BLOCKS = {
     "lateral": ("rail, laterally",),
     "slabs": ("slab",),
 }
-"""Parts of the state, and what the sentence must name."""
+"""Parts of the state, with the words that the message must contain."""
 
 SETTINGS = ["train.distance=40", f"ensemble.size={TRAINS}", 'output.precision="double"']
 Change = Callable[[Any, int], None]
 
 
 def physics(folder: Path, repeats: int) -> list[Check]:
-    """Not a number, and growth, at random steps in every part of the state.
+    """Insert NaN or growth at random steps in every part of the state.
 
     Args:
-        folder: For results.
-        repeats: Of each.
+        folder: Folder of the results.
+        repeats: Number of repeats of each.
     """
     rng = np.random.default_rng(SEED)
     scenario = load_scenario("paper", SETTINGS)
@@ -61,7 +60,7 @@ def physics(folder: Path, repeats: int) -> list[Check]:
 def _disturbed(
     path: Path, scenario: Any, reference: Contents, kind: str, block: str, train: int, step: int, dt: float, rng: Any
 ) -> Check:
-    """Spoil one train's state from a step on."""
+    """Corrupt one train's state from a step on."""
     crossed: list[float] = []
     change = _nan(block, train, step, rng) if kind == "not a number" else _growth(block, train, step)
     with _spoiled(change, block, train, crossed, dt), simulate.run(scenario, path, workers=1, force=True) as result:
@@ -73,7 +72,7 @@ def _disturbed(
         late = float(events["time"][-1]) - crossed[0]
         bad += [] if -1e-9 <= late <= WITHIN + 1e-9 else [f"caught {late:g} s after it began"]
         named = any(word in str(events["message"][-1]) for word in BLOCKS[block])
-        if not named and late < 0.5 * dt:  # later, it has spread over the train through the wheels
+        if not named and late < 0.5 * dt:  # later it has spread over the train through the wheels
             bad.append(f"names another part: {events['message'][-1]}")
     found = contents(path)
     bad += [
@@ -86,7 +85,7 @@ def _disturbed(
 
 
 def _nan(block: str, train: int, step: int, rng: Any) -> Change:
-    """One coordinate, its rate or its acceleration is no number at the end of a step."""
+    """Set one coordinate, its rate or its acceleration to NaN at the end of a step."""
     row = int(rng.choice([at.U, at.V, at.A]))
 
     def change(state: Any, done: int) -> None:
@@ -98,7 +97,7 @@ def _nan(block: str, train: int, step: int, rng: Any) -> Change:
 
 
 def _growth(block: str, train: int, step: int) -> Change:
-    """A part's motion grows by a half in every step, as in an unstable scheme."""
+    """Let a part's motion grow by a half in every step, as in an unstable scheme."""
 
     def change(state: Any, done: int) -> None:
         if done >= step and np.isfinite(state.motion).all():
@@ -111,34 +110,32 @@ def _growth(block: str, train: int, step: int) -> Change:
 @contextmanager
 def _spoiled(change: Change, block: str, train: int, crossed: list[float], dt: float) -> Iterator[None]:
     """Runs whose steps end with a change of the state, before the guard looks; notes when a limit is passed."""
-    begin = march.Run.begin
+    begin = time_loop.Run.begin
 
     def spoiled(*arguments: Any, **options: Any) -> Any:
         run = begin(*arguments, **options)
         state, stepper = run.stepper.state, run.stepper
 
         def spoil() -> None:
-            done = run.done + stepper.asked[0] + 1
+            done = run.done + stepper.rows.step + 1
             change(state, done)
             if not crossed and not all(
-                bool((np.abs(state.view(row, block)[train]) < limit).all()) for row, limit in LIMITS.items()
+                bool((np.abs(rows) < limit).all()) for rows, limit in zip(state.part(train, block), LIMITS, strict=True)
             ):
                 crossed.append(done * dt)
 
-        *before, guard = stepper.stages
-        assert guard[0] == "guards", guard[0]
-        stepper.stages = (*before, ("faults", spoil), guard)
+        stepper.watch("faults", spoil, before="guards")
         return run
 
-    march.Run.begin = staticmethod(spoiled)  # type: ignore[method-assign,assignment]
+    time_loop.Run.begin = staticmethod(spoiled)  # type: ignore[method-assign,assignment]
     try:
         yield
     finally:
-        march.Run.begin = begin  # type: ignore[method-assign]
+        time_loop.Run.begin = begin  # type: ignore[method-assign]
 
 
 def _unstable(path: Path, checked: bool) -> Check:
-    """A step that is far too long: refused at the start, and caught on the way if that check is taken out."""
+    """Use a step that is far too long: refused at the start, and detected during the run if that check is removed."""
     words = f"numerics.time_step = 0.001, five times too long{'' if checked else ', past the check at the start'}"
     tolerated = prepare.TOLERATED_GROWTH
     prepare.TOLERATED_GROWTH = tolerated if checked else math.inf

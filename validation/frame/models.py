@@ -1,4 +1,4 @@
-"""Models of the paper's case that several files look into without running them."""
+"""Models of the paper's case that several files use without running them."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ __all__ = ["paper_model"]
 
 @cache
 def paper_model(*overrides: str, dt: float = 2e-4) -> Model:
-    """Model of the paper's case with changes, at a time step dt [s], as it starts."""
+    """Build the model of the paper's case with changes, at a time step dt [s] and the speed of the start."""
     scenario = load_scenario("paper", overrides)
     return build_model(ingredients(scenario, dt), scenario.train.speed.at(0.0)[0])

@@ -1,105 +1,89 @@
-"""A stepper that is given way after way to run, and timed; callers keep BLAS on one thread, as runs do."""
+"""Groups of trains whose steps are timed in the run's own loop; callers keep BLAS on one thread, as runs do."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
-from tiengine.irregularity.irregularity import Irregularity, make_irregularity
+from tiengine.engine.stepper import Stepper
 from tiengine.model.model import Ingredients, build_model
-from tiengine.profiling.timed_loop import StageTimers, Times
-from tiengine.recording.recorder import Recorder
+from tiengine.profiling.timed_loop import StageTimer, Times
 from tiengine.scenario.scenario import Scenario
+from tiengine.simulation.tasks import Task
+from tiengine.simulation.time_loop import CHUNK_STEPS, LoopTimer, Run
 
 __all__ = ["Bench", "timed_in_turn"]
 
 WARM_UP = 100  # steps
 
 
+class _AllTimed(StageTimer):
+    """Stage timers in every step."""
+
+    def take(self, stepper: Stepper, rows: Iterable[tuple[int, int, int]]) -> None:
+        """Take the steps of a chunk."""
+        self.take_timed(stepper, list(rows))
+
+
 @dataclass(eq=False)
 class Bench:
-    """The step of some trains; writing is not part of it.
+    """Running trains; writing their samples is not part of the time.
 
     Attributes:
-        scenario: Says how it starts, and what is recorded.
-        stepper: Advances them.
-        tracks: Irregularity under each.
-        recorder: Decides which steps are recorded.
-        V: Speed [m/s].
-        done: Steps so far.
+        run: The trains.
     """
 
-    scenario: Scenario
-    stepper: Stepper
-    tracks: list[Irregularity]
-    recorder: Recorder
-    V: float
-    done: int = 0
+    run: Run
 
     @classmethod
-    def of(cls, scenario: Scenario, given: Ingredients, steps: int) -> Bench:
+    def of(cls, scenario: Scenario, ingredients: Ingredients, steps: int) -> Bench:
         """Set up.
 
         Args:
-            scenario: Of one train.
-            given: What the model is made from, trains included.
-            steps: In a block.
+            scenario: Scenario of one train, long enough for all steps.
+            ingredients: Ingredients of the model, number of trains included.
+            steps: Steps in a block.
         """
-        V = scenario.train.speed.fastest
-        model = build_model(given, V)
-        state = State.at_rest(model)
-        equilibrium(model, state, scenario.rear, V)
-        stepper = Stepper(model, state, Chunk.empty(model, steps, steps + 1, steps + 1))
-        stepper.compile()
-        lead = scenario.rear + float(model.wheel_s.max())
-        tracks = [
-            make_irregularity(scenario.irregularity.model_copy(update={"seed": seed}), lead)
-            for seed in range(given.trains)
-        ]
-        bench = cls(scenario, stepper, tracks, Recorder(scenario, given.newmark.dt), V)
+        model = build_model(ingredients, scenario.train.speed.fastest)
+        seeds = range(ingredients.trains)
+        tracks = tuple(scenario.irregularity.model_copy(update={"seed": seed}) for seed in seeds)
+        bench = cls(Run.of(Task(0, scenario, tuple(seeds), tracks), model))
         bench.block_us(min(WARM_UP, steps))
         return bench
 
     def block_us(self, steps: int) -> float:
-        """Wall time of a step of all trains [us], mean over a block; loading it included."""
-        felt, X = self._ahead(steps)
+        """Wall time of a step of all trains [us], mean over a block; loading and collecting it included."""
         clock = time.perf_counter_ns()
-        self.stepper.load(X, np.full(steps, self.V), np.zeros(steps), felt)
-        for row in self.recorder.rows(self.done, steps):
-            self.stepper.step(*row)
+        self._advance(steps)
         spent = time.perf_counter_ns() - clock
-        self.done += steps
-        if not np.isfinite(self.stepper.state.motion).all():
-            raise RuntimeError(f"{self.scenario.name}: ran away within {self.done} steps; times would mean nothing")
         return spent * 1e-3 / steps
 
     def shares(self, steps: int) -> dict[str, float]:
         """Share of each stage of the step, the largest first."""
-        timers = StageTimers(self.stepper)
-        times = Times(timers.calls)
-        felt, X = self._ahead(steps)
-        self.stepper.load(X, np.full(steps, self.V), np.zeros(steps), felt)
-        timers.run(list(self.recorder.rows(self.done, steps)), times)
-        self.done += steps
+        times = Times.of(self.run.stepper)
+        self.run.timer = _AllTimed(times, steps)
+        self._advance(steps)
+        self.run.timer = LoopTimer()
         total = sum(times.stages.values())
         return {name: ns / total for name, ns in sorted(times.stages.items(), key=lambda item: -item[1])}
 
-    def _ahead(self, steps: int) -> tuple[Any, Any]:
-        """Irregularity of the coming steps, and chainage of the window's rear end [m]."""
-        X = self.scenario.rear + self.V * self.recorder.dt * np.arange(self.done + 1.0, self.done + steps + 1.0)
-        model = self.stepper.model
-        wheels = (X + model.centre_s)[:, None] + model.given.train.wheelset_x
-        return np.stack([track.sample(wheels) for track in self.tracks]), X
+    def _advance(self, steps: int) -> None:
+        """Take steps.
+
+        Raises:
+            RuntimeError: A train failed or the distance ended; times would mean nothing.
+        """
+        end = self.run.done + steps
+        while self.run.done < end:
+            if not self.run.unfinished or self.run.advance(min(CHUNK_STEPS, end - self.run.done)).failed:
+                name = self.run.task.scenario.name
+                raise RuntimeError(f"{name}: failed or ended within {self.run.done} steps; times would mean nothing")
 
 
 def timed_in_turn(benches: Sequence[Bench], rounds: int, steps: int) -> list[float]:
-    """Wall time of a step of each [us], medians over rounds in which all take a block in turn."""
+    """Wall time of a step of each bench [us], medians over rounds in which each runs a block in turn."""
     spent = [[bench.block_us(steps) for bench in benches] for _ in range(rounds)]
     return [float(x) for x in np.median(spent, axis=0)]

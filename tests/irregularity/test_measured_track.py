@@ -1,49 +1,13 @@
-"""Tracks from a file or a user's function: splines through known points and the errors of bad input."""
+"""Tracks from a file: splines through known points and the errors of bad input."""
 
 import numpy as np
 import pytest
 
-from tiengine.irregularity.irregularity import IrregularityParams, from_function, make_irregularity
+from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
 from tiengine.parameters.errors import InputError
 
 FAR = -1e9  # the irregularity has begun long before any chainage of these tests
 MEASURED = "x,z_v,theta\n# by hand\n" + "".join(f"{x},{0.001 * (x % 3)},{1e-4 * x}\n" for x in range(0, 100, 2))
-
-
-def test_user_function_as_spline():
-    """A wave of 2 m on a grid of 0.05 m: value within (kh)^4/384, slope 0.02 (kh)^3 k; exact on the grid."""
-    k, h = np.pi, 0.05
-
-    def wave(x):
-        return np.sin(k * x), 0.0, np.cos(k * x), 1.0
-
-    track_ = from_function(wave, taper_start=FAR, spacing=h)
-    x = np.random.default_rng(0).uniform(-500.0, 500.0, 3000)
-    sampled = track_.sample(x)
-    exact = np.stack(
-        [np.sin(k * x), 0 * x, np.cos(k * x), 1 + 0 * x, k * np.cos(k * x), 0 * x, -k * np.sin(k * x), 0 * x],
-        -1,
-    )
-    error = np.abs(sampled - exact).max(axis=0)
-    assert (error[:4] < 1.1 * (k * h) ** 4 / 384 + 1e-13).all()  # a tenth for the next order
-    assert (error[4:] < 0.02 * (k * h) ** 3 * k + 1e-12).all()
-    nodes = h * np.arange(-5000, 5000, 37)
-    assert np.abs(track_.sample(nodes)[:, 0] - np.sin(k * nodes)).max() < 1e-12  # rounding
-
-
-def test_user_function_with_slopes():
-    """The user's own slopes are used, the taper's product rule on top."""
-
-    def parabola(x):
-        return x**2, x, 0.0, 0.0
-
-    def slopes(x):
-        return 2 * x, 1.0, 0.0, 0.0
-
-    sampled = from_function(parabola, slopes=slopes, taper_start=0.0, taper=10.0).sample(np.array([5.0, 20.0]))
-    T, dT = 0.5, 30 / 16 / 10.0  # the step's middle
-    assert sampled[0] == pytest.approx([25 * T, 5 * T, 0, 0, 10 * T + 25 * dT, T + 5 * dT, 0, 0])
-    assert sampled[1] == pytest.approx([400, 20, 0, 0, 40, 1, 0, 0])
 
 
 def test_measured_series(tmp_path):
@@ -89,15 +53,3 @@ def test_bad_file_is_refused(tmp_path, text, reason):
 def test_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"irregularity.file = .*none.csv': cannot be read \(No such file"):
         make_irregularity(IrregularityParams(file=str(tmp_path / "none.csv")), 0.0)
-
-
-def test_bad_function_is_refused():
-    """Spacing, number of series, values and shape."""
-    with pytest.raises(InputError, match=r"irregularity.spacing = 0: must be > 0"):
-        from_function(lambda x: (x, x, x, x), taper_start=0.0, spacing=0.0)
-    with pytest.raises(InputError, match="gives 2 series; must be 4"):
-        from_function(lambda x: (x, x), taper_start=FAR).sample(np.zeros(1))
-    with pytest.raises(InputError, match="must be finite everywhere"):
-        from_function(lambda x: (x, x, x, x * np.nan), taper_start=FAR).sample(np.zeros(1))
-    with pytest.raises(InputError, match="must have the shape of x"):
-        from_function(lambda x: (x, x, x, x[:3]), taper_start=FAR).sample(np.zeros(1))

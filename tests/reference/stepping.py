@@ -1,4 +1,4 @@
-"""Driving the step by hand: models at any step or number of trains, marches with every step recorded."""
+"""Steps without the run's loop: models at any time step or number of trains, every step recorded."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium, release
-from tiengine.engine.state import State
-from tiengine.engine.stepper import Chunk, Stepper
+from tiengine.engine.sine_state import SineState
+from tiengine.engine.sine_stepper import SineStepper
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
@@ -43,8 +44,8 @@ def model_of(name: str, *overrides: str, dt: float, **changes: Any) -> Model:
 
 
 @dataclass(eq=False)
-class March:
-    """What a march leaves.
+class History:
+    """Record of every step.
 
     Attributes:
         model, state: After the last step.
@@ -54,7 +55,7 @@ class March:
     """
 
     model: Model
-    state: State
+    state: SineState
     time: NDArray[np.float64]
     wheel: NDArray[np.float64]
     body: NDArray[np.float64]
@@ -70,16 +71,16 @@ class March:
         return self.wheel[..., at.LATERAL_FORCE]
 
 
-def march(
+def run_steps(
     name: str,
     *overrides: str,
     dt: float,
     duration: float,
     start: str = "equilibrium",
-    each: Callable[[int, Stepper], None] | None = None,
+    each: Callable[[int, SineStepper], None] | None = None,
     model: Model | None = None,
     **options: Any,
-) -> March:
+) -> History:
     """Advance a scenario at constant speed and keep every step; the window's rear end begins at chainage zero.
 
     Args:
@@ -95,22 +96,22 @@ def march(
     given = scenario(name, *overrides)
     V = given.train.speed.at(0.0)[0]
     model = model or model_of(name, *overrides, dt=dt)
-    state = State.at_rest(model)
+    state = SineState.at_rest(model)
     if start == "equilibrium":
         equilibrium(model, state, 0.0, V)
     else:
         release(model, state, 0.0)
-    track = make_irregularity(given.irregularity, float(model.wheel_s.max()))
-    chunk = Chunk.empty(model, CHUNK, CHUNK, CHUNK)
-    stepper = Stepper(model, state, chunk, **options)
+    track = make_irregularity(given.irregularity, float(model.ingredients.wheel_s.max()))
+    chunk = Chunk.empty(model.ingredients, CHUNK, CHUNK, CHUNK)
+    stepper = SineStepper(model, state, chunk, **options)
     steps = round(duration / dt)
     wheels, bodies = [], []
     with threadpool_limits(1):
         for first in range(0, steps, CHUNK):
             count = min(CHUNK, steps - first)
             X = V * dt * np.arange(first + 1, first + count + 1)
-            felt = track.sample(X[:, None] + model.wheel_s)
-            stepper.load(X, np.full(count, V), np.zeros(count), felt[None])
+            irregularity = track.sample(X[:, None] + model.ingredients.wheel_s)
+            stepper.load(X, np.full(count, V), np.zeros(count), irregularity[None])
             for i in range(count):
                 stepper.step(i, i, i)
                 if each is not None:
@@ -118,4 +119,4 @@ def march(
             wheels.append(chunk.wheel[0, :count].copy())
             bodies.append(chunk.body[0, :count].copy())
     time = dt * np.arange(1, steps + 1)
-    return March(model, state, time, np.concatenate(wheels), np.concatenate(bodies))
+    return History(model, state, time, np.concatenate(wheels), np.concatenate(bodies))

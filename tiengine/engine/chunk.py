@@ -1,0 +1,45 @@
+"""Input and records of a number of steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tiengine.kernels import layout as at
+from tiengine.model.model import Ingredients
+from tiengine.parameters.arrays import Reals
+
+__all__ = ["Chunk"]
+
+
+@dataclass(eq=False)
+class Chunk:
+    """Buffers of a number of steps; the same for every kind of step.
+
+    Attributes:
+        clock: Window at the end of each step, shape (steps, N_CLOCK).
+        irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
+        wheel: Recorded wheel output, shape (B, rows, W, 2, N_WHEEL).
+        body: Recorded displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
+        mortar: Largest and smallest pressure of each slab [Pa], with the bodies, shape (B, rows, slots, 2).
+    """
+
+    clock: Reals
+    irregularity: Reals
+    wheel: Reals
+    body: Reals
+    mortar: Reals
+
+    @classmethod
+    def empty(cls, ingredients: Ingredients, steps: int, wheel_rows: int, body_rows: int) -> Chunk:
+        """Buffers for ``steps`` steps of which some are recorded."""
+        train, B = ingredients.train, ingredients.trains
+        W, bodies = len(train.wheelset_x), len(train.body_names)
+        return cls(
+            clock=np.zeros((steps, at.N_CLOCK)),
+            irregularity=np.zeros((B, steps, W, at.N_IRREGULARITY)),
+            wheel=np.zeros((B, max(wheel_rows, 1), W, 2, at.N_WHEEL)),
+            body=np.zeros((B, max(body_rows, 1), 3, 5 * bodies)),
+            mortar=np.zeros((B, max(body_rows, 1), ingredients.slots, 2)),
+        )

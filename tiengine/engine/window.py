@@ -1,0 +1,36 @@
+"""Seats and slabs under the moving window."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tiengine.kernels import layout as at
+from tiengine.parameters.arrays import Reals
+from tiengine.track.slab import Slab
+
+__all__ = ["window_clock"]
+
+
+def window_clock(slab: Slab, X: Reals, V: Reals, V_rate: Reals) -> Reals:
+    """Position of the window over seats and slabs at a row of instants.
+
+    Seat j is at chainage (j + 1/2) d and enters at s = l; the rear seat has 0 < s_0 <= d. Slab K lies over
+    K p < x < (K + 1) p.
+
+    Args:
+        slab: Gives the pitches of seats and slabs, d and p.
+        X: Chainage of the window's rear end [m], shape (steps,).
+        V: Speed [m/s].
+        V_rate: Its rate [m/s^2].
+
+    Returns:
+        Rows for the kernels, see ``layout``, shape (steps, N_CLOCK).
+    """
+    d, p = slab.fastening_pitch, slab.pitch
+    clock = np.zeros((len(X), at.N_CLOCK))
+    first = np.maximum(np.floor(X / d - 0.5).astype(np.int64) + 1, 0)
+    clock[:, at.POSITION], clock[:, at.SPEED], clock[:, at.SPEED_RATE] = X, V, V_rate
+    clock[:, at.FIRST_SEAT] = first
+    clock[:, at.FIRST_SEAT_S] = (first + 0.5) * d - X
+    clock[:, at.FIRST_SLAB] = np.floor(X / p)
+    return clock
