@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from tiengine.irregularity.irregularity import Irregularity
-from tiengine.model.model import Ingredients
+from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.checkpoint import Checkpoint
 from tiengine.simulation.messages import Begun, Costs, Ended, Lost, Message, Paused, Saved
