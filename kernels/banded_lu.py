@@ -6,17 +6,17 @@ from tiengine.kernels.types import Reals2
 
 
 @ti.kernel
-def factorise(band: Reals2):
+def factorise(band_out: Reals2):
     """Replace a matrix by its factors.
 
-    ``band[i, q]`` is A[i, i - k + q], shape (N, 2k + 1), on return L below the diagonal (its own is 1), U from it on.
+    ``band_out[i, q]`` is A[i, i - k + q], shape (N, 2k + 1), on return L below the diagonal (its own is 1), then U.
     """
     ti.loop_config(serialize=True)
-    for i in range(band.shape[0]):
-        k = band.shape[1] // 2
-        pivot = 1.0 / band[i, k]
-        for m in range(1, ti.min(k, band.shape[0] - 1 - i) + 1):
-            factor = band[i + m, k - m] * pivot
-            band[i + m, k - m] = factor
+    for i in range(band_out.shape[0]):
+        k = band_out.shape[1] // 2
+        pivot = 1.0 / band_out[i, k]
+        for m in range(1, ti.min(k, band_out.shape[0] - 1 - i) + 1):
+            factor = band_out[i + m, k - m] * pivot
+            band_out[i + m, k - m] = factor
             for q in range(1, k + 1):
-                band[i + m, k - m + q] = band[i + m, k - m + q] - factor * band[i, k + q]
+                band_out[i + m, k - m + q] = band_out[i + m, k - m + q] - factor * band_out[i, k + q]

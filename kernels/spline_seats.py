@@ -36,7 +36,7 @@ def first_function(k: int, span: Array):
 
 
 @ti.func
-def add_point(j: int, k: int, t: float, weight: float, curvature: float, place: Array, span: Array, shape: Array):
+def add_point(j: int, k: int, t: float, weight: float, curvature: float, place: Array, span: Array, shape_out: Array):
     """Add the values and slopes at t in span k to a seat's shape: (value, slope) in its first two numbers.
 
     ``curvature`` is the mean square of the points' offsets, for a seat that lies in one span; else 0.
@@ -48,14 +48,14 @@ def add_point(j: int, k: int, t: float, weight: float, curvature: float, place: 
         value = ((c3 * t + c2) * t + c1 + 3.0 * c3 * curvature) * t + c0 + c2 * curvature
         slope = (3.0 * c3 * t + 2.0 * c2) * t + c1 + 3.0 * c3 * curvature
         m = start + f * at.N_SEAT_SHAPE
-        shape[m] = shape[m] + weight * value
-        shape[m + 1] = shape[m + 1] + weight * slope
+        shape_out[m] = shape_out[m] + weight * value
+        shape_out[m + 1] = shape_out[m + 1] + weight * slope
 
 
 @ti.func
 def seat_shapes(
     s0: float, first_seat: int, first_slab: int, slots: int, V: float, size: Array, dims: Array, constants: Array,
-    point: Array, span: Array, place: Array, shape: Array,
+    point: Array, span: Array, place: Array, shape_out: Array,
 ):  # fmt: skip
     """Functions that each seat touches, its numbers for them, and its place on the slabs.
 
@@ -71,7 +71,7 @@ def seat_shapes(
         point: Offset [m] and weight of the Gauss points, ascending, shape (points, 2).
         span: Ends, polynomials and first function of the spans, shape (spans, N_SPAN).
         place: Functions touched and place on the slabs, shape (seats, N_SEAT_PLACE); filled.
-        shape: Numbers of each seat and function, shape (seats TOUCHED N_SEAT_SHAPE,); filled.
+        shape_out: Numbers of each seat and function, shape (seats TOUCHED N_SEAT_SHAPE,); filled.
     """
     length = constants[layout.LENGTH]
     kv, cv = constants[layout.K_VERTICAL], constants[layout.C_VERTICAL]
@@ -90,21 +90,21 @@ def seat_shapes(
             place[j, at.TOUCH_FIRST] = first_function(k, span)
             count = first_function(last, span) + 4 - first_function(k, span)
             for m in range(count * at.N_SEAT_SHAPE):
-                shape[j * at.TOUCHED * at.N_SEAT_SHAPE + m] = 0.0
+                shape_out[j * at.TOUCHED * at.N_SEAT_SHAPE + m] = 0.0
             if k == last and s + point[0, 0] >= 0.0 and s + point[points - 1, 0] <= length:
-                add_point(j, k, s - span[k, at.SPAN_REAR], 1.0, spread, place, span, shape)
+                add_point(j, k, s - span[k, at.SPAN_REAR], 1.0, spread, place, span, shape_out)
             else:
                 for g in range(points):
                     x = s + point[g, 0]
                     if x >= 0.0 and x <= length:
                         while k < last and x > span[k, at.SPAN_FRONT]:
                             k += 1
-                        add_point(j, k, x - span[k, at.SPAN_REAR], point[g, 1], 0.0, place, span, shape)
+                        add_point(j, k, x - span[k, at.SPAN_REAR], point[g, 1], 0.0, place, span, shape_out)
             for q in range(count):
                 m = (j * at.TOUCHED + q) * at.N_SEAT_SHAPE
-                N, D = shape[m], -V * shape[m + 1]
-                shape[m + at.PULL_U], shape[m + at.PULL_V] = kv * N + cv * D, cv * N
-                shape[m + at.SIDE_U], shape[m + at.SIDE_V] = kl * N + cl * D, cl * N
+                N, D = shape_out[m], -V * shape_out[m + 1]
+                shape_out[m + at.PULL_U], shape_out[m + at.PULL_V] = kv * N + cv * D, cv * N
+                shape_out[m + at.SIDE_U], shape_out[m + at.SIDE_V] = kl * N + cl * D, cl * N
         place[j, at.TOUCH_COUNT] = count
         slab = (first_seat + j) // per_slab
         slot = slab % slots

@@ -163,8 +163,8 @@ def contact_of_train(
         for m in ti.static(range(5)):
             before[m] = wheelset_force[b, w, m]
         count = ct.solve_wheelset(
-            b, w, V, x, dx, left, right, channels, dims, constants, wheel, table, wheelset_compliance, coupling, contact,
-            force, wheelset_force, rail_force, tolerance,
+            b, w, V, x, dx, left, right, channels, dims, constants, wheel, table, wheelset_compliance, coupling,
+            contact, force, wheelset_force, rail_force, tolerance,
         )  # fmt: skip
         add_wheelset_change(
             b, w, start, before, wheelset_place, wheelset_force, car_columns_start, columns, car, blocks

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
@@ -46,11 +45,11 @@ class Run:
     def __init__(self, model: Model, V: float, X: float = 0.0, steps: int = 1000, start: bool = True) -> None:
         """Put the train into steady rolling at chainage X of the window's rear end [m]."""
         self.model, self.V, self.X = model, V, X
-        self.state = SineState.at_rest(model)
+        self.state = state_at_rest(model)
         if start:
             equilibrium(model, self.state, X, V)
         self.chunk = Chunk.empty(model.ingredients, steps, steps, steps)
-        self.stepper = SineStepper(model, self.state, self.chunk)
+        self.stepper = make_stepper(model, self.state, self.chunk)
 
     def advance(self, steps: int, irregularity: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Advance; returns the wheels' output, shape (steps, W, 2, N_WHEEL)."""

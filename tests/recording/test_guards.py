@@ -31,7 +31,7 @@ def guard() -> Guard:
 def guard_of(policy: Events, track_end: float = np.inf) -> Guard:
     model = model_of("smooth", "numerics.modes_per_metre=2", dt=STEP)
     state = SineState.at_rest(model)
-    state.enter(model, 0, 0)
+    state.enter(0, 0)
     state.force[..., 0] = 7e4
     stepper = SineStepper(model, state, Chunk.empty(model.ingredients, 1, 1, 1))
     return Guard.watching(stepper, policy, np.full(1, track_end))

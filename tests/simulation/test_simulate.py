@@ -9,8 +9,8 @@ import pytest
 import xarray
 from numpy.typing import NDArray
 
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.static_track import StaticTrack
+from tiengine.engine.kinds import state_at_rest
+from tiengine.engine.steady import steady_track
 from tiengine.kernels import layout as at
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation import simulate
@@ -92,11 +92,11 @@ def test_ripple_has_the_size_of_the_tracks_contrast(smooth):
     """
     run, _ = smooth
     model = run.model
-    state = SineState.at_rest(model)
+    state = state_at_rest(model)
     deflection = []
     for X in np.linspace(0.5 * SEAT_PITCH, 1.5 * SEAT_PITCH, 8, endpoint=False):
-        state.enter(model, 1, 0)
-        track = StaticTrack(model, state, 1.5 * SEAT_PITCH - X, SPEED)
+        state.enter(1, 0)
+        track = steady_track(model, state, 1.5 * SEAT_PITCH - X, SPEED)
         force = np.zeros((1, 4, 2, 3))
         force[..., 0] = 1.0
         deflection.append(track.under_wheels(force)[0, 1, 0, 0])

@@ -132,7 +132,8 @@ class SplineArrays:
     @property
     def designs(self) -> NDArray[np.int64]:
         """Design of the slab in each slot, shape (8 groups,); the last slots may hold none."""
-        return self.slab_design.reshape(self._whole, -1)[0].astype(np.int64)
+        first: Floats = self.slab_design.reshape(self._whole, -1)[0]
+        return first.astype(np.int64)
 
     def _car_view(self, row: int) -> Floats:
         """A row of the cars as (train, car, coordinate)."""

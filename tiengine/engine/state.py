@@ -72,7 +72,8 @@ class State(ABC):
         A recorder calls it after those steps at which :attr:`Stepper.seat_extremes_due` says so.
 
         Args:
-            smallest, largest: Shape as :attr:`seat_forces`.
+            smallest: Shape as :attr:`seat_forces`.
+            largest: Same shape.
         """
 
     @abstractmethod

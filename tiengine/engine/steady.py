@@ -84,7 +84,7 @@ def _seats(model: Model, state: State, first_seat_s: float) -> SeatsInWindow:
     """Fastenings under the window, those that reach into it included."""
     g = model.ingredients
     j = np.arange(g.seats)
-    s = first_seat_s + j * g.slab.fastening_pitch
+    s: Reals = np.asarray(first_seat_s + j * g.slab.fastening_pitch, np.float64)
     j = j[(s > -g.seat_reach) & (s < g.length + g.seat_reach)]
     slab, seat = np.divmod(state.first_seat + j, g.slab.fastenings)
     modelled = slab < state.first_slab + g.slots  # beyond the modelled slabs the ground is rigid

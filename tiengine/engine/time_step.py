@@ -70,7 +70,8 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
             return model, jit
         growth = f"free vibration of the track grows by a factor {found:.3g} within 80 steps"
     raise InputError(
-        f"numerics.time_step = {wanted}: unstable; {growth}; choose a shorter step, more passes or fewer trial functions"
+        f"numerics.time_step = {wanted}: unstable; {growth}; choose a shorter step, more passes or fewer"
+        " trial functions"
     )
 
 

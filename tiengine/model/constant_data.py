@@ -22,7 +22,7 @@ from tiengine.parameters.arrays import Reals
 from tiengine.track.slab_matrices import SlabMatrices
 from tiengine.vehicle.train import static_wheel_loads
 
-__all__ = ["MassAndStiffness", "Model", "SlabOperators", "shared_arrays", "slab_operators"]
+__all__ = ["CONTACT_TOLERANCE", "MassAndStiffness", "Model", "SlabOperators", "shared_arrays", "slab_operators"]
 
 CONTACT_TOLERANCE = 1e-6  # of the static wheel load: below single precision of the recorded forces
 

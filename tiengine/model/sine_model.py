@@ -1,8 +1,9 @@
-"""Constant data of the step with sines. Arrays have the shapes that the kernels of :mod:`tiengine.kernels.step` read."""
+"""Constant data of the step with sines, in the shapes that the kernels of :mod:`tiengine.kernels.step` read."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -90,7 +91,7 @@ def build_sine_model(ingredients: Ingredients, V: float) -> SineModel:
     return model
 
 
-def _slab_products(ingredients: Ingredients) -> dict[str, Reals]:
+def _slab_products(ingredients: Ingredients) -> dict[str, Any]:
     """Products and inverses of every slab design."""
     seats = seat_shapes(ingredients.designs.matrices[0])
     linear, push, inverses = [], [], []

@@ -75,6 +75,11 @@ def run_task(
     yield Ended(task.number, run.ends(loop), Costs(os.getpid(), run.jit, setup, loop, peak_memory()))
 
 
+def _functions(ingredients: Ingredients) -> dict[str, int]:
+    """Trial functions of a rail field: sines are modes."""
+    return {"modes" if ingredients.grading is None else "functions": ingredients.functions.count}
+
+
 def facts_at_start(task: Task, ingredients: Ingredients, tracks: Sequence[Irregularity]) -> dict[int, dict[str, Any]]:
     """Facts of each train that are known from the start, by its number."""
     shared = {
@@ -83,7 +88,7 @@ def facts_at_start(task: Task, ingredients: Ingredients, tracks: Sequence[Irregu
         "time_step": ingredients.newmark.dt,
         "passes": ingredients.passes,
         "window_length": ingredients.length,
-        "modes": ingredients.modes,
+        **_functions(ingredients),
         "slabs": ingredients.slots,
         "seats_in_window": ingredients.seats,
     }

@@ -43,6 +43,8 @@ def seat_tables(modes: int, length: float, spacing: float, seat_length: float = 
         cos(k_i j d) for i = 1..N, then sin(k_i j d), with k_i = i pi / l, times the factor by which the mean over a
         seat's length reduces them; shape (2 N, seats).
     """
-    k = np.arange(1, modes + 1) * np.pi / length
+    k = np.asarray(np.arange(1, modes + 1) * np.pi / length, np.float64)
     phase = np.outer(k, np.arange(seat_count(length, spacing)) * spacing)
-    return np.vstack([np.cos(phase), np.sin(phase)]) * np.tile(mean_cosine(k, seat_length), 2)[:, None]
+    mean = np.tile(mean_cosine(k, seat_length), 2)[:, None]
+    table: NDArray[np.float64] = np.vstack([np.cos(phase), np.sin(phase)]) * mean
+    return table
