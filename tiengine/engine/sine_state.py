@@ -108,11 +108,6 @@ class SineState(State):
         """Forces of the rails on the seats, shape (B, 2, 3, seats)."""
         return self.seat_force
 
-    def widen(self, smallest: Reals, largest: Reals) -> None:
-        """Widen extremes by the seats' forces of the last step."""
-        np.maximum(largest, self.seat_force, out=largest)
-        np.minimum(smallest, self.seat_force, out=smallest)
-
     def body_motion(self, kind: int) -> Reals:
         """Motion of the bodies, shape (B, 5 bodies)."""
         return self.view(ROWS[kind], "vehicles")[:, self._bodies]

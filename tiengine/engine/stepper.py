@@ -72,9 +72,9 @@ class Stepper(ABC):
         self._mark: Callable[[str], object] | None = None
 
     @property
-    @abstractmethod
     def seat_extremes_due(self) -> bool:
-        """Whether the extremes of the seats' forces must be taken from the state after this step."""
+        """Whether the extremes of the seats' forces must be taken from the state after this step; by default always."""
+        return True
 
     @abstractmethod
     def _stages(self) -> Iterator[Stage]:
