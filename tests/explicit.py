@@ -1,4 +1,4 @@
-"""The explicit half of a pass at a given state: what rails, slabs and seats feel, the wheels lifted off."""
+"""Explicit part of a pass at a given state: forces of rails, slabs and seats, with the wheels lifted off."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What the fuzz tests share: a deadline, mutations of texts and bytes, a property run on many examples.
+"""Shared parts of the fuzz tests: a deadline, mutations of texts and bytes, a property run on many examples.
 
-Every property counts what was refused; a mutation that happens to leave a valid input must be read as what it is, and
-is not counted. ``EXAMPLES`` is quick in the usual suite; ``pytest -m slow`` asks for at least ``BAD`` refused inputs.
+Every property counts refused inputs; a mutation that leaves the input valid must be read correctly, and is not
+counted. ``EXAMPLES`` is quick in the usual suite; ``pytest -m slow`` requires at least ``BAD`` refused inputs.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ BAD = 1000
 EXAMPLES = pytest.mark.parametrize(
     "examples", [pytest.param(50, id="quick"), pytest.param(6 * BAD, id="many", marks=pytest.mark.slow)]
 )
-DEADLINE = 60.0  # s: an input that takes longer hangs; most take some ms
+DEADLINE = 60.0  # s: an input that takes longer hangs; most take a few ms
 ODD = (
     *("", " ", "-", "0", "-1", "1e400", "-1e-400", "nan", "-inf", "inf", "true", "1_000", "0x10", "٣", "1,5", "1.2.3"),
     *("é", "\0", "\x1b[2J", "\u2028", "\ud7ff", "[[", "]]", "{", "}", '"', "'''", '"""', "#", "!", "=", ".", ",", ";"),
     *("\n", "\r", "\t", "9" * 5000, "[" * 3000, "a." * 3000, "x" * 20_000, "1 " * 6000, "__import__('os')", "../../x"),
     *("1e308", "1e-308", "9223372036854775808", "1979-05-27", "/dev/zero", "~nobody/x.toml"),
 )
-"""Tokens that readers stumble over."""
+"""Tokens that readers may mishandle."""
 
 
 class HangError(Exception):
@@ -42,7 +42,7 @@ class HangError(Exception):
 
 @contextmanager
 def deadline(seconds: float = DEADLINE) -> Iterator[None]:
-    """Fail what does not end."""
+    """Fail an action that does not end in time."""
 
     def late(number: int, frame: Any) -> None:
         raise HangError(f"longer than {seconds} s")
@@ -57,7 +57,7 @@ def deadline(seconds: float = DEADLINE) -> Iterator[None]:
 
 
 def refused(action: Callable[[], object]) -> str | None:
-    """The message with which an input was refused, None if it was taken; anything else fails the test."""
+    """Message with which an input was refused, None if it was accepted; anything else fails the test."""
     with deadline():
         try:
             action()
@@ -70,12 +70,12 @@ def refused(action: Callable[[], object]) -> str | None:
 
 
 def on_many(examples: int, strategy: st.SearchStrategy[Any], check: Callable[[Any], bool]) -> None:
-    """Run a check that says whether its input was refused on many inputs.
+    """Run a check on many inputs; it returns whether its input was refused.
 
     Args:
         examples: Inputs to try.
-        strategy: Makes them; derandomized, so that a failure comes back.
-        check: Raises where the rules are broken.
+        strategy: Source of the inputs, derandomised so that failures are reproducible.
+        check: Function that raises if a rule is broken.
     """
     seen: Counter[bool] = Counter()
 
@@ -88,7 +88,7 @@ def on_many(examples: int, strategy: st.SearchStrategy[Any], check: Callable[[An
     )
     @given(strategy)
     def property_(value: Any) -> None:
-        if examples < BAD or seen[True] < BAD:  # enough is enough
+        if examples < BAD or seen[True] < BAD:  # enough refused inputs
             seen[check(value)] += 1
 
     property_()
@@ -128,18 +128,18 @@ def mutated_texts(draw: st.DrawFn, text: str) -> str:
 
 @dataclass(frozen=True)
 class Damage:
-    """Changes of bytes; hypothesis keeps every example, so it is these that it makes and not whole files.
+    """Changes of bytes; hypothesis keeps every example, hence it generates changes and not whole files.
 
     Attributes:
-        cut: Share of the content that stays.
-        edits: Places as shares of the content, and what stands there.
+        cut: Share of the content that remains.
+        edits: Positions as shares of the content, and new bytes there.
     """
 
     cut: float
     edits: tuple[tuple[float, bytes], ...]
 
     def of(self, content: bytes, hot: int = 0) -> bytes:
-        """The damaged content; every other edit falls into its first ``hot`` bytes, where a file's structure is."""
+        """Damaged content; every other edit is within the first ``hot`` bytes, which hold a file's structure."""
         found = bytearray(content)
         for i, (share, piece) in enumerate(self.edits):
             at = int(share * (hot if hot and i % 2 == 0 else len(found)))

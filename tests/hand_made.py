@@ -11,7 +11,7 @@ import numpy as np
 
 from tiengine import result as results
 from tiengine.result import Result
-from tiengine.result_files.damage import LAYOUT
+from tiengine.result_files.layout import DIMENSIONS
 from tiengine.result_files.reader import FORMAT, FORMAT_VERSION
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.vehicle.train import assemble, static_wheel_loads
@@ -59,7 +59,7 @@ def written(path: Path, of: Scenario, *trains: Groups, status: str = "complete",
                         group.attrs.update(values)
                     else:
                         group[key] = list(values) if isinstance(values, tuple) else values
-                _label(group, LAYOUT.get(name, ()))
+                _label(group, DIMENSIONS.get(name, ()))
     return path
 
 

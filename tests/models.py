@@ -46,7 +46,7 @@ def default_model(*overrides: str, V: float = V350, dt: float = 2e-4, **changes:
 
 
 class Run:
-    """A state marched at constant speed, one step a call."""
+    """A state advanced at constant speed, every step recorded."""
 
     def __init__(self, model: Model, V: float, X: float = 0.0, steps: int = 1000, start: bool = True) -> None:
         """Put the train into steady rolling at chainage X of the window's rear end [m]."""
@@ -57,7 +57,7 @@ class Run:
         self.chunk = Chunk.empty(model.ingredients, steps, steps, steps)
         self.stepper = make_stepper(model, self.state, self.chunk)
 
-    def march(self, steps: int, irregularity: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    def advance(self, steps: int, irregularity: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Advance; returns the wheels' output, shape (steps, W, 2, N_WHEEL)."""
         X = self.X + self.V * self.model.ingredients.newmark.dt * np.arange(1, steps + 1)
         trains, wheelsets = self.state.iterations.shape

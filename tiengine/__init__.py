@@ -1,8 +1,7 @@
-"""tiengine: trains on slab track, in three dimensions, by a window of rail that moves with them.
+"""Dynamic interaction of trains and slab track in three dimensions, on a window of rail that moves with the train.
 
-``run(scenario)`` simulates, ``resume(path)`` goes on with a run that was stopped, ``open(path)`` reads a result
-file. All are loaded when first used, so that importing the
-package costs nothing.
+``run(scenario)`` simulates, ``resume(path)`` continues an interrupted run, ``open(path)`` reads a result file. Each is
+imported at its first use, so that ``import tiengine`` itself is fast.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first asked for."""
+    """Import a public name at its first use."""
     from importlib import import_module
 
     if name not in _HOMES:

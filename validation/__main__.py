@@ -1,4 +1,4 @@
-"""Command line: ``python -m validation`` and its commands."""
+"""Command line ``python -m validation`` and its commands."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ REPORT = ROOT / "validation" / "report" / "verification.md"
 
 
 @click.group(invoke_without_command=True)
-@click.option("--quick", is_flag=True, help="Only the cases that together take less than five minutes.")
-@click.option("--only", multiple=True, metavar="NAME", help="Only cases whose name begins so; may be repeated.")
-@click.option("--write", is_flag=True, help="Bring the table of README.md and validation/report up to date.")
+@click.option("--quick", is_flag=True, help="Run only the cases that together take less than five minutes.")
+@click.option(
+    "--only", multiple=True, metavar="NAME", help="Run only cases whose name begins with NAME; may be repeated."
+)
+@click.option("--write", is_flag=True, help="Update the tables in README.md and validation/report.")
 @click.pass_context
 def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool) -> None:
-    """Hold the engine to closed forms, others' numbers and its own convergence; status 1 on a miss."""
+    """Compare the engine with closed forms, published numbers and finer settings; exit status 1 if a case misses."""
     if context.invoked_subcommand is not None:
         return
     from validation.frame.catalogue import CASES, HEADLINES
@@ -39,7 +41,7 @@ def main(context: click.Context, quick: bool, only: tuple[str, ...], write: bool
         outcomes.append(evaluate(case))
         last = outcomes[-1]
         console.print(f"{last.verdict:16} {case.name}  {last.seconds:.1f} s", highlight=False)
-        if write:  # at once: a run of forty minutes that is stopped loses nothing
+        if write:  # after every case, so that an interrupted run loses nothing
             REPORT.parent.mkdir(exist_ok=True)
             known = keep([last], REPORT.with_suffix(".json"), CASES)
     show(outcomes, console)
@@ -86,10 +88,10 @@ def paper() -> None:
 @click.argument("scenario")
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Result file.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key: train.speed_kmh=300")
-@click.option("--length", default=600.0, show_default=True, help="Rail [m].")
-@click.option("--modes-per-metre", default=2.0, show_default=True, help="Trial functions a field and metre.")
-@click.option("--slab-modes", default=20, show_default=True, help="Free-free plate modes a slab.")
-@click.option("--time-step", default=2e-4, show_default=True, help="dt [s].")
+@click.option("--length", default=600.0, show_default=True, help="Length of the rail [m].")
+@click.option("--modes-per-metre", default=2.0, show_default=True, help="Trial functions per field and metre.")
+@click.option("--slab-modes", default=20, show_default=True, help="Free-free plate modes per slab.")
+@click.option("--time-step", default=2e-4, show_default=True, help="Time step [s].")
 @click.option("--force", is_flag=True, help="Replace an existing result file.")
 def msm(
     scenario: str, output: Path, settings: tuple[str, ...], length: float, modes_per_metre: float, slab_modes: int,
@@ -108,7 +110,8 @@ def msm(
         ) as result:
             facts = result.attributes
     console.print(
-        f"{facts['dofs']} DOFs, {facts['steps']} steps, {1e3 * facts['wall_time_loop'] / facts['steps']:.2f} ms a step,"
+        f"{facts['dofs']} DOFs, {facts['steps']} steps, {1e3 * facts['wall_time_loop'] / facts['steps']:.2f} ms per"
+        f" step,"
         f" {facts['real_time_factor']:.1f} s per simulated second; wrote {output}"
     )
 

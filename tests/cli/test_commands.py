@@ -1,6 +1,6 @@
-"""Command line: exit status, one-line errors, output, and that nothing is left behind.
+"""Command line: exit status, one-line errors, output, and no remaining files.
 
-The run itself is replaced by a short fake one that writes a real result file.
+The simulation is replaced by a short substitute that writes a real result file.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-import tiengine
 from tiengine import result as results
+from tiengine import simulation
 from tiengine.cli.commands import main
 from tiengine.parameters.errors import RunStoppedError
 from tiengine.parameters.presets import KINDS, preset_names
 from tiengine.result_files.channels import WHEEL
-from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
+from tiengine.result_files.layout import GroupSpec, TrainLabels
+from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import to_toml
 
 LABELS = TrainLabels(["coach"], ["car"], np.zeros(4, np.int64), np.array([10.0, 7.5, -7.5, -10.0]))
@@ -59,7 +60,7 @@ def fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
 
     module.run = run
     monkeypatch.setitem(sys.modules, "tiengine.simulation.simulate", module)
-    monkeypatch.setattr(tiengine, "simulate", module, raising=False)
+    monkeypatch.setattr(simulation, "simulate", module, raising=False)  # where an earlier import has put the real one
     monkeypatch.chdir(tmp_path)
     return module
 
@@ -143,7 +144,7 @@ def test_unknown_scenario(fake):
 
 
 def test_existing_result_needs_force(fake):
-    """An older result is not lost by accident."""
+    """An existing result is not overwritten by accident."""
     assert call("run", "paper", "--quiet").exit_code == 0
     assert_refused(
         call("run", "paper", "--quiet"), "output = 'paper.h5': exists already; choose another name or --force"
@@ -158,11 +159,11 @@ def test_interrupted_run_can_be_resumed(fake, tmp_path, number):
     fake.failure = lambda: os.kill(os.getpid(), number)
     result = call("run", "paper", "--quiet")
     assert result.exit_code == 128 + number
-    assert result.stderr == "stopped after 0.001 of 0.002 s of simulated time; go on by: tiengine resume paper.h5\n"
+    assert result.stderr == "stopped after 0.001 of 0.002 s of simulated time; resume with: tiengine resume paper.h5\n"
 
 
 def test_second_interrupt_leaves_at_once(fake):
-    """Whoever is in a hurry loses what was not committed."""
+    """A second signal ends the program at once, without a commit."""
 
     def twice() -> None:
         os.kill(os.getpid(), signal.SIGINT)
@@ -185,7 +186,7 @@ def test_list_names_every_preset():
 
 
 def test_info_describes_a_result(fake):
-    """What was run, with what, and what the file holds."""
+    """Scenario, versions and contents of the file are listed."""
     call("run", "paper", "--quiet")
     text = call("info", "paper.h5").stdout
     for word in (

@@ -17,7 +17,7 @@ from tiengine.irregularity.irregularity import make_irregularity
 from validation.cases.bdf import RTOL, SHORT, SIZES, STEPS
 from validation.cases.semi_discrete import SemiDiscrete
 
-from ..reference.marching import KMH, march, model_of, scenario
+from ..reference.stepping import KMH, model_of, run_steps, scenario
 
 SPEED = 350.0 * KMH
 
@@ -64,7 +64,7 @@ def test_wheel_forces_against_bdf(system):
     reference = np.array([equations.contact(t, y).rail[0, :, :, :2] for t, y in zip(times, found.y.T, strict=True)])
     errors = []
     for dt in STEPS:
-        run = march("paper", *SHORT, dt=dt, duration=duration)
+        run = run_steps("paper", *SHORT, dt=dt, duration=duration)
         forces = np.stack([run.vertical, run.lateral], axis=-1)[round(2e-4 / dt) - 1 :: round(2e-4 / dt)]
         errors.append(np.abs(forces - reference).max(axis=(0, 1, 2)) / np.ptp(reference, axis=(0, 1, 2)))
     assert np.all(errors[-1] < 1e-4)

@@ -93,7 +93,7 @@ def test_seat_force_by_marching_a_fixed_rail() -> None:
     K[:modes, :modes] += SEATS.stiffness * shape.T @ shape
     solve = np.linalg.inv(M + dt / 2.0 * C + dt**2 / 4.0 * K)
     u, v, a = np.zeros((3, 2 * modes))
-    steps, middle, way, force = round(16.0 / (V350 * dt)), 20, [], []
+    steps, middle, distance, force = round(16.0 / (V350 * dt)), 20, [], []
     for step in range(1, steps + 1):
         place = 5.0 + V350 * dt * step
         load = np.zeros(2 * modes)
@@ -101,14 +101,14 @@ def test_seat_force_by_marching_a_fixed_rail() -> None:
         u, v = u + dt * v + dt**2 / 4.0 * a, v + dt / 2.0 * a
         a = solve @ (load - C @ v - K @ u)
         u, v = u + dt**2 / 4.0 * a, v + dt / 2.0 * a
-        way.append(place - seats[middle])
+        distance.append(place - seats[middle])
         force.append(shape[middle] @ (SEATS.stiffness * u[:modes] + SEATS.damping * v[:modes]))
-    x, marched = np.array(way), np.array(force)
+    x, computed = np.array(distance), np.array(force)
     exact = seat_force(CHN60, SEATS, V350, P, x)
-    beside = np.abs(x - SEATS.pitch * np.round(x / SEATS.pitch)) > length / (2 * modes)  # away from the jumps
+    smooth = np.abs(x - SEATS.pitch * np.round(x / SEATS.pitch)) > length / (2 * modes)  # away from the jumps
     near = np.abs(x) < 3.0
-    assert np.abs(marched - exact)[near & beside].max() < 5e-3 * exact.max()
-    assert np.sqrt(np.mean((marched - exact)[near] ** 2)) < 2e-3 * exact.max()
+    assert np.abs(computed - exact)[near & smooth].max() < 5e-3 * exact.max()
+    assert np.sqrt(np.mean((computed - exact)[near] ** 2)) < 2e-3 * exact.max()
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.02])

@@ -61,12 +61,12 @@ def test_forces_are_the_law_at_the_end_of_the_step(V: float, shift: float, kick:
     model = paper_model(V=V, dt=dt, passes=6)
     run = Run(model, V, X=3.3, steps=20)
     track = disturbed(run, 1, shift, kick)
-    run.march(20, np.broadcast_to(track, (1, 20, 4, at.N_IRREGULARITY)))
+    run.advance(20, np.broadcast_to(track, (1, 20, 4, at.N_IRREGULARITY)))
     law = at_the_coordinates(model, run.state, V, track[:, 0])
     largest = np.abs(run.state.force[..., :3]).max()
     assert largest > 3e4
     assert kick > 1e-2 or run.state.iterations.max() < kernels.ITERATIONS
-    # tolerance 1e-6 of the wheel load a component; a pass takes the rest down by 10-20
+    # tolerance 1e-6 of the wheel load a component; a pass reduces the error by 10-20
     error = np.abs(law.local - run.state.force)[..., :3].max()
     share = 1e-4 if kick > 1e-2 else 1e-5  # thrown against the flange a wheelset is not still after six passes
     assert error < share * largest
@@ -76,11 +76,11 @@ def test_forces_are_the_law_at_the_end_of_the_step(V: float, shift: float, kick:
 
 @pytest.mark.parametrize(("V", "shift"), [(V350, 0.0), (V350, 8e-3), (20.0 / 3.6, 4e-3), (WALK, 0.0)])
 def test_three_passes_are_consistent(V: float, shift: float) -> None:
-    """What three passes leave is small beside the wheel load; it caught a miscompiled Newton loop."""
+    """The residual after three passes is small against the wheel load; this found a miscompiled Newton loop."""
     model = paper_model(V=V, dt=1e-4, passes=3)
     run = Run(model, V, X=101.0, steps=50)
     track = disturbed(run, 2, shift, 1e-3)
-    run.march(50, np.broadcast_to(track, (1, 50, 4, at.N_IRREGULARITY)))
+    run.advance(50, np.broadcast_to(track, (1, 50, 4, at.N_IRREGULARITY)))
     law = at_the_coordinates(model, run.state, V, track[:, 0])
     error = np.abs(law.local - run.state.force)[..., :3].max()
     assert error < 1e-5 * 68.7e3  # N; two passes leave ten times as much
@@ -93,7 +93,7 @@ def test_kick_at_walking_pace_dies_out() -> None:
     model = paper_model(V=WALK, dt=2e-4)
     run = Run(model, WALK, X=3.3, steps=200)
     disturbed(run, 1, 0.0, 3e-3)
-    wheel = run.march(200)
+    wheel = run.advance(200)
     Y = wheel[..., at.LATERAL_FORCE]
     assert np.abs(Y).max() < 5e3  # friction would allow 20 kN
     assert np.abs(np.diff(Y[-50:], axis=0)).max() < 50.0  # no chatter from step to step
@@ -107,7 +107,7 @@ def test_wheel_lifts_and_lands() -> None:
     run = Run(model, V350, steps=150)
     track = np.zeros((1, 150, 4, at.N_IRREGULARITY))
     track[0, 10:60, 1, at.Z_V] = 2e-3  # m: faster than the wheelset can fall
-    wheel = run.march(150, track)
+    wheel = run.advance(150, track)
     second = wheel[:, 1]
     air = second[20:40]
     assert not air[..., [at.NORMAL_FORCE, at.VERTICAL_FORCE, at.LATERAL_FORCE]].any()

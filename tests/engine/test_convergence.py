@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tiengine.simulation.simulate import AUTO_STEPS
 
-from ..reference.marching import march, model_of
+from ..reference.stepping import model_of, run_steps
 
 STEPS = (2e-4, 1e-4, 5e-5, 2.5e-5)
 KINDS = ("vertical", "lateral")
@@ -19,7 +19,7 @@ KINDS = ("vertical", "lateral")
 @pytest.fixture(scope="module")
 def forces() -> dict[str, list[NDArray[np.float64]]]:
     """Wheel forces of the first second at the instants of the longest step, by kind and step."""
-    runs = [march("paper", dt=dt, duration=1.0) for dt in STEPS]
+    runs = [run_steps("paper", dt=dt, duration=1.0) for dt in STEPS]
     return {
         kind: [
             getattr(run, kind)[round(2e-4 / dt) - 1 :: round(2e-4 / dt)] for dt, run in zip(STEPS, runs, strict=True)
@@ -74,7 +74,7 @@ def test_mortar_implicit_or_explicit():
     difference = []
     for passes in (2, 3, 4):
         runs = [
-            march(
+            run_steps(
                 "paper",
                 dt=2e-4,
                 duration=0.3,
@@ -93,7 +93,7 @@ def test_mortar_implicit_or_explicit():
 
 def test_more_passes_converge():
     """The iterates approach the fully implicit step; two passes are within the step's own error of it."""
-    runs = [march("paper", dt=2e-4, duration=0.3, model=model_of("paper", dt=2e-4, passes=n)) for n in (2, 3, 4, 8)]
+    runs = [run_steps("paper", dt=2e-4, duration=0.3, model=model_of("paper", dt=2e-4, passes=n)) for n in (2, 3, 4, 8)]
     for kind in KINDS:
         limit = getattr(runs[-1], kind)
         gap = [np.abs(getattr(run, kind) - limit).max() / np.abs(limit).max() for run in runs[:-1]]

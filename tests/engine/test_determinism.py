@@ -15,19 +15,19 @@ from tiengine.kernels import layout as at
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation import simulate
 
-from ..reference.marching import March, march, model_of
+from ..reference.stepping import History, model_of, run_steps
 
 PROGRAM = Path(__file__).parents[1] / "reference" / "run_bits.py"
 DURATION = 0.05
 
 
 @pytest.fixture(scope="module")
-def once() -> March:
+def once() -> History:
     """The paper's case, serial, one train."""
-    return march("paper", dt=1e-4, duration=DURATION)
+    return run_steps("paper", dt=1e-4, duration=DURATION)
 
 
-def assert_same_bits(a: March, b: March) -> None:
+def assert_same_bits(a: History, b: History) -> None:
     """Every recorded number and the whole final motion."""
     np.testing.assert_array_equal(a.wheel, b.wheel)
     np.testing.assert_array_equal(a.body, b.body)
@@ -37,7 +37,7 @@ def assert_same_bits(a: March, b: March) -> None:
 @pytest.mark.parametrize("options", [{}, {"public": True}], ids=["again", "public"])
 def test_same_bits(once, options):
     """A second run; public launches: the same machine code on the same numbers."""
-    assert_same_bits(once, march("paper", dt=1e-4, duration=DURATION, **options))
+    assert_same_bits(once, run_steps("paper", dt=1e-4, duration=DURATION, **options))
 
 
 def test_parallel_loop_agrees_to_rounding(once):
@@ -45,7 +45,7 @@ def test_parallel_loop_agrees_to_rounding(once):
 
     So the bits of a run depend on whether its loop is the parallel one, never on the number of threads.
     """
-    parallel = march("paper", dt=1e-4, duration=DURATION, parallel=True)
+    parallel = run_steps("paper", dt=1e-4, duration=DURATION, parallel=True)
     np.testing.assert_allclose(parallel.vertical, once.vertical, atol=1e-6)
     np.testing.assert_allclose(parallel.lateral, once.lateral, atol=1e-6)
 
@@ -61,7 +61,7 @@ def test_public_launch_of_a_run():
 
 
 def in_a_process(threads: int, optimised: bool, steps: int) -> dict[str, Any]:
-    """What ``run_bits`` prints."""
+    """Output of ``run_bits``."""
     command = [sys.executable, str(PROGRAM), str(threads), str(int(optimised)), str(steps)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return json.loads(done.stdout.splitlines()[-1])
@@ -96,7 +96,7 @@ def test_two_equal_trains(once):
             row = i % 500
             found.append(stepper.chunk.wheel[:, row].copy())
 
-    two = march("paper", dt=1e-4, duration=DURATION, model=model_of("paper", dt=1e-4, trains=2), each=each)
+    two = run_steps("paper", dt=1e-4, duration=DURATION, model=model_of("paper", dt=1e-4, trains=2), each=each)
     for block in ("vertical", "lateral", "slabs", "vehicles"):
         for row in (at.U, at.V, at.A):
             both = two.state.view(row, block)

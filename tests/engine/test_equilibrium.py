@@ -35,7 +35,7 @@ def test_slippery_rolling_stays_steady():
     """0.1 s from the start at a friction of 0.02: wheel loads ripple over the seats, nothing else moves."""
     V = 350.0 * KMH
     run = Run(default_model("track.friction=0.02", V=V), V, steps=500)
-    wheel = run.march(500)
+    wheel = run.advance(500)
     load = run.model.constants[at.STATIC_LOAD]
     np.testing.assert_allclose(wheel[..., at.VERTICAL_FORCE], load, rtol=0.05)
     assert np.abs(wheel[..., at.LATERAL_FORCE]).max() < 0.02 * 1.1 * load + 0.05 * load

@@ -110,9 +110,9 @@ def test_compliance_is_symmetric_at_rest() -> None:
         unit = np.eye(24).reshape(24, 4, 2, 3)
         return track.under_wheels(unit)[..., :3].reshape(24, 24)
 
-    rest, moving = compliance(0.0), compliance(V350)
-    np.testing.assert_allclose(rest, rest.T, atol=1e-12 * rest.max())
-    assert np.all(np.linalg.eigvalsh(rest) > 0.0)
+    still, moving = compliance(0.0), compliance(V350)
+    np.testing.assert_allclose(still, still.T, atol=1e-12 * still.max())
+    assert np.all(np.linalg.eigvalsh(still) > 0.0)
     assert np.abs(moving - moving.T).max() > 1e-4 * moving.max()
 
 
@@ -129,7 +129,7 @@ def test_local_compliance_stands_in_for_the_modes_left_out() -> None:
         found[modes, local] = StaticTrack(model, state, 0.315, V).under_wheels(load)[0]
     exact = found[288, True]
     without, with_it = (np.abs(found[72, local] - exact).max(axis=(0, 1)) for local in (False, True))
-    # a half is asked for: the contrast of seats under short waves is not in the correction, nor the phase of sin^2;
+    # a half is required: the contrast of seats under short waves is not in the correction, nor the phase of sin^2;
     # the lateral deflection comes from bending and torsion, whose long waves are all there: it may only not be worse
     assert np.all(with_it[[0, 2]] < 0.5 * without[[0, 2]])
     assert with_it[1] <= without[1]

@@ -74,7 +74,7 @@ def test_slabs_keep_their_state() -> None:
 def test_fresh_slab_is_at_rest_and_leaves_no_trace(model: Model) -> None:
     """While a real run passes joints, slabs enter without motion, and the wheels do not notice the change."""
     run = Run(model, V350, X=PITCH - 0.1)
-    wheel = run.march(40)  # the joint is passed at step 11
+    wheel = run.advance(40)  # the joint is passed at step 11
     assert run.state.first_slab == 1
     force = wheel[..., at.VERTICAL_FORCE]
     jump = np.abs(np.diff(force, n=2, axis=0)).max(axis=(1, 2))
@@ -101,7 +101,7 @@ def test_count_of_slabs_hardly_matters() -> None:
             2e-4 * taper * np.cos(k * x),
             -2e-4 * taper * k * np.sin(k * x),
         )
-        forces.append(run.march(1000, track)[..., [at.VERTICAL_FORCE, at.LATERAL_FORCE]])
+        forces.append(run.advance(1000, track)[..., [at.VERTICAL_FORCE, at.LATERAL_FORCE]])
     full, paper = forces
     assert paper_model(cover=False).ingredients.slots == 7
     assert paper_model(cover=True).ingredients.slots == 8

@@ -44,7 +44,7 @@ def test_where_the_train_has_been(tmp_path):
     end = by.START + by.V * 1.999
     np.testing.assert_array_equal(seats.reached, (chainage >= 4.0) & (chainage <= end + 10.0))
     np.testing.assert_array_equal(seats.passed, (chainage >= 24.0) & (chainage <= end - 10.0))
-    assert seats.half_passed[0] == pytest.approx((6 * 0.63, 38 * 0.63))  # seats 6 to 37, half a pitch more
+    assert seats.partly_passed[0] == pytest.approx((6 * 0.63, 38 * 0.63))  # seats 6 to 37, half a pitch more
     assert seats.defects == []
 
 
@@ -94,7 +94,7 @@ def test_defects_are_marked(tmp_path):
         assert widths["fastenings with a defect"] == pytest.approx(3 * 0.63)
         assert spans["slab over a void"] == pytest.approx(24 * 5.67)
         assert widths["slab over a void"] == pytest.approx(5.67)
-    assert "Mortar about slab 24" in titles(figure)
+    assert "Mortar around slab 24" in titles(figure)
     assert ["1.60"] == [text.get_text() for text in figure.axes[1].texts]  # 80 over 50 kPa
 
 

@@ -68,7 +68,7 @@ def test_bands_take_several_values_a_place():
 
 
 def test_forces_are_those_of_the_file(tmp_path):
-    """Low pass and means of the indices; the bands reach as far as any wheel; chainage is the wheelset's own."""
+    """Low pass and means equal those of the indices; bands span all wheels; the chainage is that of the wheelset."""
     Q, Y = noise(1000)
     with by.made(tmp_path / "a.h5", by.scenario(), {"wheel": by.wheel(Q, Y)}) as result:
         figure = forces.draw(result)
@@ -106,7 +106,7 @@ def test_forces_beyond_the_limits_stay_in_the_picture(tmp_path):
 
 
 def test_slices_are_filtered_as_one(tmp_path):
-    """A run of two and a half slices, seam by seam: what the filter forgets over ten periods is below 1e-12."""
+    """Two and a half slices equal one piece: after ten periods the filter's response is below 1e-12."""
     force = rng.standard_normal((5 * SLICE // 2, 4, 2))
     with by.made(tmp_path / "a.h5", by.scenario(), {"wheel": by.wheel(force, force, 2e-4)}) as result:
         samples = Train(result).samples("wheel", "vertical_force")
@@ -154,7 +154,10 @@ def test_comparison_of_a_file_with_itself_shifted(tmp_path):
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [({"start": 5000.0}, "have no metre in common"), ({"wheelset_offset": by.OFFSET + 1.0}, "not at the same places")],
+    [
+        ({"start": 5000.0}, "overlap by less than 1 m"),
+        ({"wheelset_offset": by.OFFSET + 1.0}, "wheelsets at different places"),
+    ],
 )
 def test_files_that_cannot_be_compared(tmp_path, change, message):
     """Another stretch of track, another train."""
@@ -211,13 +214,13 @@ def test_runs_too_short_for_a_spectrum(tmp_path):
     """0.1 s."""
     with (
         by.made(tmp_path / "a.h5", by.scenario(), {"wheel": by.wheel(*noise(100))}) as result,
-        pytest.raises(AbsentError, match=r"0\.1 s behind the run-in are too short"),
+        pytest.raises(AbsentError, match=r"0\.1 s after the run-in are too short"),
     ):
         spectrum.draw(result)
 
 
 def test_contact_histogram(tmp_path):
-    """Left wheels a quarter of the time at 2.1 mm, else at -3.1 mm; right ones at 5.1 mm; what is in the air is not."""
+    """Left wheels a quarter of the time at 2.1 mm, else at -3.1 mm; right ones at 5.1 mm; time in the air is not."""
     position = np.full((400, 4, 2), 5.1e-3)
     position[:, :, 0] = -3.1e-3
     position[:100, :, 0] = 2.1e-3

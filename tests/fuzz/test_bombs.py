@@ -1,4 +1,4 @@
-"""Inputs that are too large, never end, or lead elsewhere: refused at once, by limits that the message states."""
+"""Inputs that are too large, never end, or lead elsewhere are refused at once, by limits that the message states."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
 
 
 def sparse(path: Path, size: int, content: bytes = b"") -> None:
-    """A file that claims many bytes and takes none of the disk."""
+    """Sparse file of many bytes that takes no space on the disk."""
     with path.open("wb") as file:
         file.write(content)
         file.truncate(size)
@@ -46,7 +46,7 @@ def sparse(path: Path, size: int, content: bytes = b"") -> None:
 @pytest.mark.parametrize("name", READERS)
 @pytest.mark.parametrize("what", ["pipe", "device", "link to a device", "folder", "nothing", "link to itself"])
 def test_what_is_no_regular_file(name: str, what: str, tmp_path: Path) -> None:
-    """Neither waited for nor read: /dev/zero never ends, a pipe never begins."""
+    """Devices and pipes are neither waited for nor read: /dev/zero never ends, a pipe never begins."""
     suffix, read = READERS[name]
     path = tmp_path / f"odd{suffix}"
     match what:
@@ -71,7 +71,7 @@ def test_what_is_no_regular_file(name: str, what: str, tmp_path: Path) -> None:
     [("scenario", 100_000_000), ("part", 10**9), ("profile", 10**9), ("track", 10**9), ("checkpoint", 2**40)],
 )
 def test_large_files(name: str, size: int, tmp_path: Path) -> None:
-    """By their size, before a byte is read; the message gives both numbers."""
+    """Large files are refused by their size, before a byte is read; the message gives both numbers."""
     suffix, read = READERS[name]
     path = tmp_path / f"large{suffix}"
     sparse(path, size)
@@ -92,7 +92,7 @@ def test_long_lines(name: str, tmp_path: Path) -> None:
 
 
 def test_many_points(tmp_path: Path) -> None:
-    """Smooth, but more than any instrument gives."""
+    """A smooth profile with more points than any instrument gives is refused."""
     y = np.linspace(-30.0, 30.0, MOST_POINTS + 1)
     path = tmp_path / "fine.csv"
     path.write_text("\n".join(f"{a:.9f} {a * a / 600.0:.9f}" for a in y))
@@ -115,7 +115,7 @@ def test_many_points(tmp_path: Path) -> None:
     ids=lambda text: f"{text[:12]} {len(text)}",
 )
 def test_nested_toml(text: str) -> None:
-    """tomllib alone would end in a RecursionError, a ValueError, or take the square of a key's length."""
+    """tomllib alone would raise a RecursionError or a ValueError, or take time in the square of a key's length."""
     message = refused(lambda: parse_toml(text, "bomb.toml"))
     assert message is not None
     assert message.startswith("bomb.toml: ")
@@ -163,7 +163,7 @@ def test_nested_toml(text: str) -> None:
     ids=lambda value: value[:40] if isinstance(value, str) else "",
 )
 def test_large_scenarios(changes: dict[str, Any], rule: str) -> None:
-    """Few words that ask for hours or for more memory than there is."""
+    """Short inputs that would need hours or more memory than available are refused."""
     message = refused(lambda: load_scenario({"train": TRAIN, **changes}))
     assert message is not None
     assert rule in message
@@ -171,7 +171,7 @@ def test_large_scenarios(changes: dict[str, Any], rule: str) -> None:
 
 @pytest.mark.parametrize("name", ["../up", "/tmp/up", "a/b", "..\\up", "a\nb", "", "n" * 201])
 def test_a_name_leads_nowhere(name: str) -> None:
-    """The result is called after the scenario; it stays in the working directory."""
+    """A result named after the scenario stays in the working directory."""
     message = refused(lambda: load_scenario({"name": name, "train": TRAIN}))
     assert message is not None
     assert message.startswith("name = ")
@@ -179,7 +179,7 @@ def test_a_name_leads_nowhere(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["../../profiles/LMA", "..", "~root/x.toml", "a\0b", "x" * 5000, "~nobody/x.toml"])
 def test_names_of_presets_are_no_paths(name: str) -> None:
-    """A slash makes a path, relative to the scenario; a name is looked for in the library only."""
+    """A slash makes a path, relative to the scenario; a name is looked up in the library only."""
     for key in ("wheel_profile", "vehicles"):
         value = [name] if key == "vehicles" else name
         message = refused(lambda value=value, key=key: load_scenario({"train": {**TRAIN, key: value}}))
@@ -187,7 +187,7 @@ def test_names_of_presets_are_no_paths(name: str) -> None:
 
 
 def test_paths_are_those_of_the_scenario(tmp_path: Path) -> None:
-    """Relative to its folder, above it, absolute, by a link: files that are read; the documented choice."""
+    """Paths relative to the scenario's folder, above it, absolute and by a link are read, as documented."""
     (tmp_path / "shared").mkdir()
     (tmp_path / "runs").mkdir()
     head = tmp_path / "shared" / "head.csv"
@@ -203,13 +203,13 @@ def test_paths_are_those_of_the_scenario(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", ["/dev/null", "/dev/zero", "x" * 300 + ".h5"])
 def test_output_is_a_regular_file(path: str) -> None:
-    """Replacing /dev/null by a result would be the end of many programs."""
+    """A result never replaces a device such as /dev/null."""
     with deadline(), pytest.raises(InputError, match=r"regular file|cannot be written"):
         check_output(Path(path), force=True)
 
 
 def test_command_line_answers_in_one_line(tmp_path: Path) -> None:
-    """Whatever is quoted from an input is cut, and control characters are none."""
+    """Quotations of an input are cut and contain no control characters."""
     path = tmp_path / "wide.toml"
     train = f"[train]\nvehicles = ['a']\nspeed_kmh = '{chr(0x2028) * 5000}'\ndistance = 1\n"
     path.write_text("x" * 900 + " = 1\n" + train)

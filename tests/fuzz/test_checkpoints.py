@@ -1,4 +1,4 @@
-"""Checkpoints as nobody means them: cut, changed, forged, blown up."""
+"""Damaged and forged checkpoints: cut, changed, with false facts, with false sizes."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def same(found: Checkpoint) -> bool:
 
 @EXAMPLES
 def test_changed_bytes(examples: int, tmp_path: Path) -> None:
-    """Refused, or the same facts and bits: every byte that counts is under a checksum."""
+    """A changed checkpoint is refused, or has the same facts and bits: every relevant byte is under a checksum."""
     path = checkpoint(tmp_path)
     content = path.read_bytes()
 
@@ -71,7 +71,7 @@ def test_changed_bytes(examples: int, tmp_path: Path) -> None:
 
 @EXAMPLES
 def test_forged_facts(examples: int, tmp_path: Path) -> None:
-    """A text of facts that is no JSON, or says what cannot be, in an archive that is whole."""
+    """Facts that are no JSON or have impossible values, in an undamaged archive, are refused."""
     path = checkpoint(tmp_path)
     good = json.dumps({"version": 1, "made_by": {}, "task": 0, **FACTS})
     odd = st.dictionaries(
@@ -103,7 +103,7 @@ def test_forged_facts(examples: int, tmp_path: Path) -> None:
 
 
 def npy(shape: str, dtype: str = "'<f8'", order: str = "False") -> bytes:
-    """An array file whose header says what it likes."""
+    """Array file with an arbitrary header."""
     header = f"{{'descr': {dtype}, 'fortran_order': {order}, 'shape': {shape}, }}".encode().ljust(117) + b"\n"
     return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(64)
 
@@ -124,7 +124,7 @@ def npy(shape: str, dtype: str = "'<f8'", order: str = "False") -> bytes:
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_forged_arrays(header: bytes, why: str, tmp_path: Path) -> None:
-    """What the header of an array claims is believed only as far as the file has bytes for it."""
+    """An array's header is accepted only if the file has the bytes for it."""
     path = tmp_path / ".run.h5.0000.checkpoint"
     forged = io.BytesIO()
     with zipfile.ZipFile(forged, "w") as archive:
@@ -136,7 +136,7 @@ def test_forged_arrays(header: bytes, why: str, tmp_path: Path) -> None:
 
 
 def test_archive_bombs(tmp_path: Path) -> None:
-    """Compressed members are not unpacked; what the archive's directory claims is compared with the file's size."""
+    """Compressed members are not unpacked; sizes in the archive's directory are compared with the file's size."""
     path = tmp_path / ".run.h5.0000.checkpoint"
     bomb = io.BytesIO()
     with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -153,11 +153,11 @@ def test_archive_bombs(tmp_path: Path) -> None:
     path.write_bytes(sealed(plain.getvalue().replace(size, (2**31 - 1).to_bytes(4, "little"))))
     message = refused(lambda: Checkpoint.read(path))
     assert message is not None
-    assert "claims to hold more" in message
+    assert "declares more data" in message
 
 
 def test_a_damaged_checkpoint_says_what_to_do(tmp_path: Path) -> None:
-    """The rest of the run can be had without it."""
+    """The run can be resumed without the damaged checkpoint."""
     path = checkpoint(tmp_path)
     path.write_bytes(path.read_bytes()[:-30])
     with pytest.raises(InputError, match=r"0000\.checkpoint: not a checkpoint, or damaged .*; remove it to run"):

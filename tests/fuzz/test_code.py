@@ -1,4 +1,4 @@
-"""No input is ever executed: what could do so is not in the package."""
+"""No input is ever executed: the package contains no call that could do so."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "she
 CALLS = {"eval", "exec", "compile", "__import__", "literal_eval", "execfile"}
 LOADERS = {"load", "read_array", "genfromtxt", "loadtxt", "fromfile", "read_pickle", "memmap"}
 STARTERS = {"subprocess": {"machine.py"}, "import_module": {"__init__.py", "catalogue.py"}}
-"""What starts other code, and who may: with words of the program's own."""
+"""Calls that start other code, and the modules that may use them, with constant arguments."""
 PICKLES = {"track_function.py"}
-"""Who may pickle: a function that the caller of ``run`` passed in, on its way to the caller's own worker processes."""
+"""Modules that may pickle: a function that the caller of ``run`` passed in, for the caller's own worker processes."""
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_nothing_executes_an_input(path: Path) -> None:
-    """No unpickling, no evaluation, arrays without objects, and subprocesses only where a constant is run."""
+    """No unpickling, no evaluation, arrays without objects, and subprocesses only with constant arguments."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = {alias.name.split(".")[0] for alias in node.names}

@@ -1,4 +1,4 @@
-"""Result files as nobody means them: cut, changed, forged, foreign; each command answers in one line."""
+"""Damaged, forged and foreign result files: each command answers in one line."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ COMMANDS = (("info",), ("metrics",), ("export", "-o", "{0}.csv"), ("export", "-o
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Some twelve metres, enough for the indices."""
+    """Result of twelve metres, enough for the indices."""
     path = tmp_path_factory.mktemp("fuzz") / "whole.h5"
     settings = {
         "train.distance": 12.0,
@@ -48,7 +48,7 @@ def contents(whole: Path) -> dict[str, Any]:
 
 
 def everything(path: Path) -> dict[str, Any]:
-    """All that a file holds, by path; texts apart, which HDF5 keeps without a checksum."""
+    """Contents of a file by path, without texts, which HDF5 keeps without a checksum."""
     with tiengine.open(path) as result:
         found: dict[str, Any] = {"scenario": result.scenario_toml, "trains": result.trains}
         node = result["trains/000"]
@@ -62,7 +62,7 @@ def everything(path: Path) -> dict[str, Any]:
 
 
 def answered(path: Path, command: tuple[str, ...]) -> bool:
-    """Whether a command refused a file, in one line and with exit status 2; anything but an answer fails."""
+    """Whether a command refused a file, in one line and with exit status 2; a crash fails the test."""
     arguments = [command[0], str(path), *(word.format(path) for word in command[1:])]
     with deadline():
         done = CliRunner().invoke(main, arguments)
@@ -78,7 +78,7 @@ def answered(path: Path, command: tuple[str, ...]) -> bool:
 
 @EXAMPLES
 def test_changed_bytes(examples: int, whole: Path, contents: dict[str, Any], tmp_path: Path) -> None:
-    """Refused, or every number and the scenario as they were; a name of its own each, as HDF5 keeps files in mind."""
+    """A changed file is refused or has its numbers and scenario unchanged; new names, since HDF5 caches files."""
     content, count = whole.read_bytes(), itertools.count()
 
     def check(damage: Damage) -> bool:
@@ -97,7 +97,7 @@ def test_changed_bytes(examples: int, whole: Path, contents: dict[str, Any], tmp
 
 @EXAMPLES
 def test_changed_bytes_on_the_command_line(examples: int, whole: Path, tmp_path: Path) -> None:
-    """Every command that reads results."""
+    """Commands that read results."""
     content, count = whole.read_bytes(), itertools.count()
 
     def check(given: tuple[Damage, tuple[str, ...]]) -> bool:
@@ -114,7 +114,7 @@ Forgery = Callable[[h5py.File, str], None]
 
 
 def replace(make: Callable[[h5py.Group, str], object]) -> Forgery:
-    """Put something else in the place of a group or dataset."""
+    """Replace a group or dataset."""
 
     def forge(file: h5py.File, path: str) -> None:
         above, _, name = path.rpartition("/")
@@ -180,7 +180,7 @@ def forged(whole: Path) -> st.SearchStrategy[tuple[str, str, str, Any]]:
 
 @EXAMPLES
 def test_forged_structure(examples: int, whole: Path, forged: st.SearchStrategy[Any], tmp_path: Path) -> None:
-    """A group, dataset or attribute that is missing or something else; no file but this one is read."""
+    """A missing or replaced group, dataset or attribute is refused; no other file is read."""
     content, count = whole.read_bytes(), itertools.count()
 
     def check(given: tuple[tuple[str, str, str, Any], tuple[str, ...]]) -> bool:
@@ -198,7 +198,7 @@ def test_forged_structure(examples: int, whole: Path, forged: st.SearchStrategy[
 def test_forged_structure_resumed(
     examples: int, whole: Path, forged: st.SearchStrategy[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """``tiengine resume`` up to the point where it would compute; the file stays as it is."""
+    """``tiengine resume`` refuses before it computes; the file remains unchanged."""
 
     def stop(self: object, writer: Writer, collector: Collector, tasks: list[Task]) -> None:
         for train in writer.facts():
@@ -237,13 +237,13 @@ def foreign(kind: str, path: Path) -> None:
         with h5py.File(path, "w") as file:
             if kind != "HDF5":
                 file.attrs["format"] = "tiengine"
-                file.attrs["format_version"] = {"old": 0, "new": 2, "odd": [1, 2], "words": "1"}[kind]
+                file.attrs["format_version"] = {"old": 0, "new": 3, "odd": [1, 2], "words": "1"}[kind]
                 file.attrs["tiengine_version"] = "9.8"
 
 
 @pytest.mark.parametrize("kind", ["text", "empty", "signature", "HDF5", "old", "new", "odd", "words"])
 def test_foreign_files(kind: str, tmp_path: Path) -> None:
-    """What it is not, or which version it is and what to do."""
+    """The message states that it is no result, or its version and the remedy."""
     path = tmp_path / "foreign.h5"
     foreign(kind, path)
     for command in (*COMMANDS, ("resume",)):
@@ -251,18 +251,18 @@ def test_foreign_files(kind: str, tmp_path: Path) -> None:
     message = refused(lambda: tiengine.open(path))
     assert message is not None
     other_version = kind in ("old", "new", "odd", "words")
-    assert ("tiengine that wrote it (9.8), or run its scenario anew" in message) == other_version
+    assert ("tiengine that wrote it (9.8), or run its scenario again" in message) == other_version
     assert ("not a tiengine result" in message) != other_version
 
 
 def test_a_file_in_a_file_is_not_followed(whole: Path, tmp_path: Path) -> None:
-    """Links to other files and data kept in them are named, whoever they belong to."""
+    """Links to other files and data kept in them are named."""
     path = tmp_path / "linked.h5"
     for kind, words in (
-        ("external link", "leads to another place or file"),
-        ("soft link", "leads to another place or file"),
-        ("external data", "lies in another file"),
-        ("1e15 samples", "claims 4e+09 MB of samples, the file holds 0 MB"),
+        ("external link", "is a link to another place or file"),
+        ("soft link", "is a link to another place or file"),
+        ("external data", "stored in another file"),
+        ("1e15 samples", "declares 4e+09 MB of samples, the file holds 0 MB"),
     ):
         path.write_bytes(whole.read_bytes())
         forge(path, (kind, "trains/000/wheel/vertical_force", "", None))
@@ -274,10 +274,10 @@ def test_a_file_in_a_file_is_not_followed(whole: Path, tmp_path: Path) -> None:
 
 
 def test_a_changed_scenario_is_found_out(whole: Path, tmp_path: Path) -> None:
-    """A digit of the text, which HDF5 itself would not notice."""
+    """A changed digit of the scenario, which HDF5 itself would not detect, is detected."""
     path = tmp_path / "changed.h5"
     data = whole.read_bytes()
     assert data.count(b"friction = 0.3") == 1
     path.write_bytes(data.replace(b"friction = 0.3", b"friction = 0.4"))
     with tiengine.open(path) as result:
-        assert refused(lambda: result.scenario_toml) == f"{path}: scenario: damaged: its checksum is another one"
+        assert refused(lambda: result.scenario_toml) == f"{path}: scenario: damaged: its checksum does not match"

@@ -1,4 +1,4 @@
-"""Scenarios as nobody means them: changed texts, odd values of every key, the edges of every range."""
+"""Damaged scenarios: changed texts, odd values of every key, the ends of every range."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def numbers(value: Any) -> Iterator[float]:
 
 
 def assert_sound(loaded: Scenario) -> None:
-    """What was taken is finite, within its ranges, and loads back equal from its own text."""
+    """An accepted scenario is finite, within its ranges, and equal to the one loaded from its own text."""
     assert all(-1e15 <= x <= 1e15 or (isinstance(x, int) and abs(x) < 2**63) for x in numbers(loaded.model_dump()))
     for _, model in models(loaded):
         for key, info in type(model).model_fields.items():
@@ -158,7 +158,7 @@ def assert_sound(loaded: Scenario) -> None:
 
 @EXAMPLES
 def test_changed_texts(examples: int, tmp_path: Path) -> None:
-    """A text is refused, naming the file or a key, or means what it says."""
+    """A changed text is refused, naming the file or a key, or read as written."""
     path = tmp_path / "fuzzed.toml"
 
     def check(text: str) -> bool:
@@ -174,7 +174,7 @@ def test_changed_texts(examples: int, tmp_path: Path) -> None:
 
 @EXAMPLES
 def test_odd_values_anywhere(examples: int) -> None:
-    """One or two keys of any table take an odd value or one at the edge of a range."""
+    """One or two keys of any table with an odd value or one at the end of a range are refused or used."""
 
     @st.composite
     def changes(draw: st.DrawFn) -> dict[str, Any]:
@@ -198,7 +198,7 @@ def test_odd_values_anywhere(examples: int) -> None:
 
 @EXAMPLES
 def test_settings_on_the_command_line(examples: int) -> None:
-    """``--set`` with any text after and before the equals sign."""
+    """``--set`` accepts any text around the equals sign or refuses it with a message."""
     names = [f"{path}.{key}".lstrip(".") for path, _, key in keys()]
     texts = mutated_texts("train.vehicles.0.car.mass=[3e4, {a = 1}]")
 
@@ -224,7 +224,7 @@ def boundary_cases() -> list[tuple[type[BaseModel], str, Any]]:
 
 @pytest.mark.parametrize("stride", [pytest.param(29, id="quick"), pytest.param(1, id="all", marks=pytest.mark.slow)])
 def test_edges_of_every_parameter(stride: int) -> None:
-    """Every parameter of every class of the engine: refused with its name, or taken as it is and within its range."""
+    """Every parameter of every class is refused with its name, or accepted unchanged within its range."""
     given = {type(model): {k: getattr(model, k) for k in model.model_fields_set} for model in instances()}
     bad = 0
     for model, key, value in boundary_cases()[::stride]:
@@ -247,7 +247,7 @@ def test_edges_of_every_parameter(stride: int) -> None:
 
 @pytest.mark.parametrize(("path", "model", "key"), [pytest.param(*k, id=f"{k[0]}.{k[2]}") for k in keys()])
 def test_what_is_outside_its_range_is_named(path: str, model: type[BaseModel], key: str) -> None:
-    """Through the whole scenario: the message names the key as one would write it."""
+    """The message names the key as written in the scenario."""
     info = model.model_fields[key]
     values = [value for value in edges(info) if outside(info, value)]
     values += [math.nan, "x" * 10_001, b"", (math.inf,)]
@@ -275,10 +275,10 @@ AT_THE_EDGE: tuple[dict[str, Any], ...] = (
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")  # numbers run away by design; the guard says so
+@pytest.mark.filterwarnings("ignore")  # the run diverges on purpose, and the guard reports it
 @pytest.mark.parametrize("settings", AT_THE_EDGE, ids=lambda s: next(iter(s)))
 def test_runs_at_the_edge(settings: dict[str, Any], tmp_path: Path) -> None:
-    """Two metres with values at the ends of their ranges: a result, a refusal, or an event, never a crash."""
+    """Two metres with values at the ends of their ranges give a result, a refusal or an event, never a crash."""
     path = tmp_path / "edge.h5"
     try:
         chosen = load_scenario("smooth", {"train.distance": 2.0, "output.run_in": 0.0, **settings})

@@ -33,7 +33,7 @@ def test_what_a_zone_needs(kmh, length, zone):
     """25 sections and 10 km, one metre less is an index and says so."""
     assert section_length(kmh * KMH) == length
     assert shortfall(zone, kmh * KMH) == ""
-    assert f"way is only {zone - 1:.0f} m" in shortfall(zone - 1.0, kmh * KMH)
+    assert f"the run covers only {zone - 1:.0f} m" in shortfall(zone - 1.0, kmh * KMH)
 
 
 @pytest.mark.parametrize(

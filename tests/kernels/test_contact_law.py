@@ -91,7 +91,7 @@ def test_lifted_wheel_carries_nothing(model: Model) -> None:
     assert np.isfinite(found.contact).all()
 
 
-# A 1:20 cone, r = 0.43 m, on a rail head of R = 300 mm: FACTS 7.1; Kalker's table at nu = 0.25 beside a/b = 1.25.
+# A 1:20 cone, r = 0.43 m, on a rail head of R = 300 mm: FACTS 7.1; Kalker's table at nu = 0.25 next to a/b = 1.25.
 E, NU, SHEAR = 2.059e11, 0.25, 2.059e11 / 2.5
 C_KALKER = (4.41, 4.02, 1.77, 0.97)
 
@@ -108,8 +108,8 @@ def constant_table(model: Model, tangent: float) -> tuple[Model, tuple[float, fl
     ab = a1 * b1
     values[..., at.C11], values[..., at.C22] = SHEAR * ab * C_KALKER[0], SHEAR * ab * C_KALKER[1]
     values[..., at.C23], values[..., at.C33] = SHEAR * ab**1.5 * C_KALKER[2], SHEAR * ab**2 * C_KALKER[3]
-    given = replace(model.ingredients, contact=replace(table, values=values))
-    return replace(model, ingredients=given), (G, a1, b1)
+    ingredients = replace(model.ingredients, contact=replace(table, values=values))
+    return replace(model, ingredients=ingredients), (G, a1, b1)
 
 
 def test_forces_against_plain_formulas(model: Model) -> None:

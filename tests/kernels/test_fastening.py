@@ -135,7 +135,7 @@ def test_against_seat_by_seat(model: Model, seed: int) -> None:
 
 
 def test_slab_motion_enters_twice(model: Model) -> None:
-    """The slab feels its own motion at the predictor, the rail that of the iterate: see the kernel."""
+    """The force on the slab has its motion at the predictor, that on the rail at the iterate: see the kernel."""
     case = Seated(model, 33.3)
     case.randomise(7)
     case.launch()
@@ -259,7 +259,7 @@ def test_seats_enter_and_leave_without_a_jump(model: Model, edge: float) -> None
     for shift in (-1e-9, 1e-9):
         case = Seated(model, X + shift)
         case.randomise(40)
-        case.state.view(at.U, "slabs")[:] = 0.0  # else the slabs' own motion would be felt beyond the end
+        case.state.view(at.U, "slabs")[:] = 0.0  # else the slabs' own motion would act beyond the end
         case.state.view(at.V, "slabs")[:] = 0.0
         case.settle()
         case.constants[[at.C_VERTICAL, at.C_LATERAL]] = 0.0  # -V w' is not zero at the end; its force's share is

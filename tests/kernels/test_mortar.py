@@ -168,8 +168,8 @@ def test_lifted_slab_carries_its_weight_at_most(bed: tuple[Slab, Mortar, list[Sl
     for b in range(TRAINS):
         for s in range(SLABS):
             m = designs[DESIGN[b, s]]
-            rest = np.sum(m.bed_weight * np.maximum(m.bed_weight_pressure, 0.0))
-            assert force[b, s] @ uniform == pytest.approx(rest, rel=1e-12)  # rounding of 288 terms
+            total = np.sum(m.bed_weight * np.maximum(m.bed_weight_pressure, 0.0))
+            assert force[b, s] @ uniform == pytest.approx(total, rel=1e-12)  # rounding of 288 terms
     assert force[0, 0] @ uniform == pytest.approx(slab.mass * 9.81, rel=1e-12)
     assert not pressure.any()
 

@@ -67,8 +67,8 @@ class Device:
             if not isinstance(call, ast.Call) or (target := self._target(module, call.func)) not in self.functions:
                 continue
             names = _arguments(self.functions[target])
-            given = [*zip(names, call.args, strict=False), *((word.arg, word.value) for word in call.keywords)]
-            for name, value in given:
+            passed = [*zip(names, call.args, strict=False), *((word.arg, word.value) for word in call.keywords)]
+            for name, value in passed:
                 if name in stored[target] and isinstance(value, ast.Name) and value.id in own:
                     yield value.id
 

@@ -15,7 +15,7 @@ NAMES = ("CRH380A_v2", "CRH380A_v6", "Zhai_coach", "Manchester")
 
 
 def kernel_forces(train: TrainModel, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What the kernel adds for states of shape (trains, n)."""
+    """Forces that the kernel adds for states of shape (trains, n)."""
     motion = np.stack([u.ravel(), v.ravel(), np.zeros(u.size)])
     suspension_forces(
         train.n,

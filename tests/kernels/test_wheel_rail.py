@@ -191,7 +191,7 @@ def test_following_a_twisted_rail(model: Model) -> None:
     x.v[:, 0, Y] = (r0 + h_r) * V350 * rate
     contact = x.evaluate(model).contact[:, 0]
     for side in range(2):
-        # height that keeps the penetration, up to what a contact sits beside the line of table and crown (0.1 mm)
+        # height that keeps the penetration, up to the distance of a contact from the line of table and crown (0.1 mm)
         lever = SHIFTS * SIGMA[side] - model.constants[at.CROWN_OFFSET]
         x.v[:, 0, Z] = SIGMA[side] * lever * V350 * rate
         h_c = h_r - (contact[:, side, wr.R_C] - r0)
@@ -203,7 +203,7 @@ def test_following_a_twisted_rail(model: Model) -> None:
 def test_following_a_cross_level(model: Model) -> None:
     """Wheelset rolling with the track's twist.
 
-    What is left comes from the height and the place of the contact beside tape circle and rail top.
+    The remainder comes from the height and the place of the contact off tape circle and rail top.
     """
     rate = 1e-3  # rad/m
     r0 = model.wheel[0, 0]
@@ -218,7 +218,7 @@ def test_following_a_cross_level(model: Model) -> None:
     lever = np.abs(contact[..., wr.R_C] - r0) * contact[..., wr.COS]
     lever += np.abs(contact[..., wr.S_W]) * np.abs(contact[..., wr.SIN])
     assert np.all(slip < rate * lever * (1.0 + 1e-9) + NOTHING)
-    assert np.all(slip < 1e-6 + 1e-5 * (np.abs(contact[..., wr.SIN]) > 0.1))  # nothing beside the 1e-3 of running
+    assert np.all(slip < 1e-6 + 1e-5 * (np.abs(contact[..., wr.SIN]) > 0.1))  # nothing against the 1e-3 of running
 
 
 def test_creep_of_a_still_rail(model: Model) -> None:

@@ -66,7 +66,7 @@ def test_every_stage_of_the_step_is_reported(report):
 
 
 def test_percentiles_rise_and_factors_agree(report):
-    """Of the same steps; the two trains share the loop."""
+    """Percentiles of the same steps; the two trains share the loop."""
     loop = report.loop
     assert loop.step_us_p50 <= loop.step_us_p90 <= loop.step_us_p99 <= loop.step_us_max
     assert loop.real_time_factor_per_train == pytest.approx(loop.real_time_factor / 2, rel=ROUNDING)
@@ -74,7 +74,7 @@ def test_percentiles_rise_and_factors_agree(report):
 
 
 class Steps(Stepper):
-    """A step made of the calls it is given."""
+    """A step made of given calls."""
 
     def __init__(self, *stages: Stage) -> None:
         run = Run(paper_model(), V350, steps=1, start=False)
@@ -101,7 +101,7 @@ def test_timers_put_every_interval_to_its_stage(monkeypatch):
     now = [0]
 
     def spend(ns: int):
-        return lambda *rest: now.__setitem__(0, now[0] + ns)
+        return lambda *arguments: now.__setitem__(0, now[0] + ns)
 
     def take(stepper: Stepper, rows: list[tuple[int, int, int]]) -> None:
         for row in rows:
@@ -138,7 +138,7 @@ def test_measuring_changes_no_bit():
     """The same steps with readings and without."""
     model = paper_model()
     watched, bare = (Run(model, V350, steps=20) for _ in range(2))
-    bare.march(20)
+    bare.advance(20)
     X = V350 * model.ingredients.newmark.dt * np.arange(1, 21)
     watched.stepper.load(X, np.full(20, V350), np.zeros(20), np.zeros_like(watched.chunk.irregularity))
     StageTimer(Times.of(watched.stepper), 10).take_timed(watched.stepper, [(i, i, i) for i in range(20)])

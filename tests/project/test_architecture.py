@@ -15,11 +15,11 @@ WINGS = (
     "kernels", "parameters", "result_files", "contact", "vehicle", "track", "irregularity", "scenario", "indices",
     "result", "model", "engine", "recording", "simulation", "figures", "report", "profiling", "cli",
 )  # fmt: skip
-"""From the ground up: a wing imports from itself and from those before it in this list."""
+"""From the ground up: a wing imports only from itself and from wings before it in this list."""
 
 
 def imported(source: str) -> set[str]:
-    """Modules of the package that a text imports, ``contact.table`` for example; type-only and lazy imports too."""
+    """Modules of the package that a source imports, as ``contact.table``, including type-only and lazy imports."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "tiengine":
@@ -38,7 +38,7 @@ def _is_module(name: str) -> bool:
 
 
 def upward(module: str, source: str) -> list[str]:
-    """Imports of a module that run from its wing up to a later one, or to no known wing."""
+    """Imports of a module from a later wing than its own, or from no known wing."""
     rank = {wing: i for i, wing in enumerate(WINGS)}
     own = rank[module.split(".")[0]]
     return [name for name in sorted(imported(source)) if rank.get(name.split(".")[0], len(rank)) > own]
@@ -73,13 +73,13 @@ def cycles(imports: dict[str, set[str]]) -> list[list[str]]:
 
 
 def name_of(path: Path) -> str:
-    """Dotted name of a host module below the package, of a package that of its folder."""
+    """Dotted name of a host module below the package; a package is named after its folder."""
     parts = path.relative_to(ENGINE).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 MODULES = {name_of(path): path.read_text() for path in HOST if name_of(path)}
-"""Text of every host module but the package's own ``__init__``, which is the API over all wings."""
+"""Source of every host module except the package's own ``__init__``, which is the API over all wings."""
 
 
 def test_every_module_stands_in_a_wing():
@@ -130,7 +130,7 @@ def test_validation_files_fit_a_reader(path):
 
 
 def test_every_package_is_shipped():
-    """Packages are listed by hand, since the folder of the kernels stands elsewhere."""
+    """pyproject.toml lists all packages by hand, since the kernels are in another folder."""
     import tomllib
 
     listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]

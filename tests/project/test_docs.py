@@ -1,4 +1,4 @@
-"""The site: it builds without a complaint, loads nothing from elsewhere, and says what the code says."""
+"""The site builds without a warning, loads nothing from other sites, and agrees with the code."""
 
 import os
 import re
@@ -12,12 +12,12 @@ import pytest
 from tiengine.scenario.manual import page, tables, with_channels
 
 ROOT = Path(__file__).parents[2]
-RELOAD = "; bring it up to date by python -m tiengine.scenario.manual docs"
+RELOAD = "; update it by python -m tiengine.scenario.manual docs"
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory) -> Path:
-    """The built site. Apart from this process, since mkdocs' own warnings are no errors of ours."""
+    """The site, built in a process of its own, since warnings of mkdocs itself are not errors of the suite."""
     folder = tmp_path_factory.mktemp("site")
     done = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", folder],
@@ -32,7 +32,7 @@ def site(tmp_path_factory) -> Path:
 
 
 class Resources(HTMLParser):
-    """Addresses that a browser fetches to show a page; links that a reader may follow are not among them."""
+    """Addresses that a browser fetches to show a page, without the links that a reader may follow."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -62,11 +62,11 @@ def test_formulas_are_mathml(site):
     source = (ROOT / "docs" / "model.md").read_text(encoding="utf-8")
     assert html.count("<math") == len(re.findall(r"\$\$.+?\$\$|\$[^$]+?\$", source, flags=re.DOTALL)) > 100
     assert "arithmatex" not in html
-    assert not re.search(r"<m(i|o|text)>\\", html), "a command that the converter does not know"
+    assert not re.search(r"<m(i|o|text)>\\", html), "a LaTeX command that the converter does not know"
 
 
 def test_reports_are_pages(site):
-    """Taken from validation/report as they are, with their pictures."""
+    """Reports are taken from validation/report unchanged, with their figures."""
     for name in ("paper", "verification", "convergence", "speed"):
         assert (site / "validation" / "report" / f"{name}.html").is_file()
     assert (site / "validation" / "report" / "paper_vertical.png").is_file()
@@ -81,15 +81,15 @@ def test_channels_are_those_of_the_code():
     assert text == with_channels(text), f"docs/results.md{RELOAD}"
 
 
-def test_every_key_has_words():
-    """The last cell of each row of the reference; a key without them lacks a description in its declaration."""
+def test_every_key_is_described():
+    """The last cell of each row of the reference is its description, taken from the declaration."""
     rows = [line for line in page().splitlines() if line.startswith("| `")]
     assert len(rows) > 150
     assert not [row for row in rows if not row.split("|")[-2].strip()]
 
 
 def test_reference_knows_unit_range_and_default():
-    """Rows read off the declarations by hand: a bound, a number or a word, a list, a nested table, a required part."""
+    """Rows written by hand from the declarations: bound, number or word, list, nested table, required part."""
     text = page()
     for row in (
         "| `distance` | number | m | > 0, ≤ 1e6 | required | distance the train covers |",

@@ -1,4 +1,4 @@
-"""The manual works as written: files, commands and Python, on a few metres of track instead of hundreds."""
+"""Files, commands and Python of the manual work as written, on a few metres of track instead of hundreds."""
 
 import re
 import shlex
@@ -32,13 +32,13 @@ SHORTER = {
     },
     "full_length": {"train.distance=15": "train.distance=4"},
 }
-"""What the tests run instead, by tutorial; each text must be there."""
+"""Replacements that shorten the runs, by tutorial; each text must be there."""
 
 PROGRAMS: dict[str, Command] = {"tiengine": main, "python -m validation": validation}
 
 
 def run(line: str) -> None:
-    """A command line of a tutorial, in this process."""
+    """Run a command line of a tutorial in this process."""
     for program, command in PROGRAMS.items():
         if line.startswith(f"{program} "):
             done = CliRunner().invoke(command, shlex.split(line.removeprefix(program), comments=True))
@@ -48,7 +48,7 @@ def run(line: str) -> None:
 
 
 def follow(page: str, text: str) -> None:
-    """Everything that a page tells its reader to do, one after the other, in the working folder."""
+    """Carry out everything on a page, one after the other, in the working folder."""
     names: dict[str, object] = {}
     for language, title, code in BLOCK.findall(text):
         if language == "toml":
@@ -71,7 +71,7 @@ def test_tutorial(page, tmp_path, monkeypatch):
 
 
 def test_result_files(tmp_path, monkeypatch):
-    """The manual's page on result files, with a run of two metres."""
+    """The page on result files works with a run of two metres."""
     monkeypatch.chdir(tmp_path)
     run("tiengine run default --set train.distance=2 -o run.h5")
     follow("results.md", (DOCS / "results.md").read_text(encoding="utf-8"))

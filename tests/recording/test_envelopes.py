@@ -42,17 +42,17 @@ def test_envelopes_are_the_extremes_of_every_step(zone):
 
     stepper.watch("envelopes", envelopes.watch)
     stepper.watch("look", look)
-    run.march(1050)
+    run.advance(1050)
     none = np.zeros(0)
-    passed, rest = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
+    passed, last = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
     assert len(passed.along) == state.first_seat > 25
-    np.testing.assert_array_equal(np.concatenate([passed.along, rest.along]), sorted(seen))
-    np.testing.assert_allclose(np.concatenate([passed.place, rest.place]), (np.array(sorted(seen)) + 0.5) * d)
+    np.testing.assert_array_equal(np.concatenate([passed.along, last.along]), sorted(seen))
+    np.testing.assert_allclose(np.concatenate([passed.chainage, last.chainage]), (np.array(sorted(seen)) + 0.5) * d)
     for extreme, reduce in (("largest", np.max), ("smallest", np.min)):
         for row, kind in enumerate(("vertical", "lateral")):
             name = f"{extreme}_{kind}_force"
             expected = [reduce([force[:, row] for force in seen[seat]], axis=0) for seat in sorted(seen)]
-            np.testing.assert_array_equal(np.concatenate([passed.channels[name], rest.channels[name]]), expected)
+            np.testing.assert_array_equal(np.concatenate([passed.channels[name], last.channels[name]]), expected)
 
 
 def test_after_one_step_the_seats_carry_the_train():
@@ -64,7 +64,7 @@ def test_after_one_step_the_seats_carry_the_train():
     run = Run(paper_model(dt=DT), V350, steps=1)
     envelopes = SeatEnvelopes.of(run.stepper)
     run.stepper.watch("envelopes", envelopes.watch)
-    run.march(1)
+    run.advance(1)
     channels = envelopes.remainder()[0].channels
     train = run.model.ingredients.train
     weight = train.gravity[1 : train.n_dof : 5].sum()
@@ -104,13 +104,13 @@ def test_slabs_against_their_coordinates(mortar):
 
     stepper.watch("envelopes", envelopes.watch)
     stepper.watch("look", look)
-    run.march(500)
+    run.advance(500)
     stepper.finish(500)
     none = np.zeros(0)
-    passed, rest = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
+    passed, last = envelopes.blocks(none, none)[0], envelopes.remainder()[0]
     assert len(passed.along) == run.state.first_slab > 0
-    numbers = np.concatenate([passed.along, rest.along])
-    found = {name: np.concatenate([passed.channels[name], rest.channels[name]]) for name in passed.channels}
+    numbers = np.concatenate([passed.along, last.along])
+    found = {name: np.concatenate([passed.channels[name], last.channels[name]]) for name in passed.channels}
     np.testing.assert_array_equal(numbers, sorted(seen))
     for i, name in enumerate(("deflection", "moment_x", "moment_y")):
         expected = [(max(row[i] for row in seen[k]), min(row[3 + i] for row in seen[k])) for k in sorted(seen)]
@@ -127,7 +127,7 @@ def test_slabs_against_their_coordinates(mortar):
 
 
 def test_what_is_kept_can_be_saved_and_restored():
-    """A march that is left in the middle and taken up by another stepper ends with the same envelopes."""
+    """A run that stops halfway and is continued by another stepper ends with the same envelopes."""
     none = np.zeros(0)
 
     def watched(run: Run) -> list[Any]:
@@ -143,10 +143,10 @@ def test_what_is_kept_can_be_saved_and_restored():
     model = paper_model(dt=DT)
     whole = Run(model, V350, steps=150)
     kept = watched(whole)
-    whole.march(150)
+    whole.advance(150)
     give_out(whole, kept)
     saved, state = [deepcopy(each.saved()) for each in kept], deepcopy(whole.state)
-    whole.march(150)
+    whole.advance(150)
     expected = give_out(whole, kept) + [each.remainder()[0] for each in kept]
 
     half = Run(model, V350, X=whole.X - 150 * V350 * DT, steps=150, start=False)
@@ -155,7 +155,7 @@ def test_what_is_kept_can_be_saved_and_restored():
     others = watched(half)
     for each, values in zip(others, saved, strict=True):
         each.restore(values)
-    half.march(150)
+    half.advance(150)
     found = give_out(half, others) + [each.remainder()[0] for each in others]
     assert sum(len(block.along) for block in found) > 60
     for mine, theirs in zip(expected, found, strict=True):

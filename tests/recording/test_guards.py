@@ -1,4 +1,4 @@
-"""What goes wrong is seen within a millisecond, named, and written down."""
+"""Faults of the physics are found within a millisecond, named, and written to the file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tiengine.scenario.event_policy import Events
 from tiengine.scenario.scenario import Scenario, load_scenario
 from tiengine.simulation import simulate
 
-from ..reference.marching import model_of
+from ..reference.stepping import model_of
 
 STEP = 2e-4
 
@@ -168,9 +168,9 @@ def short(**changes: object) -> Scenario:
 def test_events_are_in_the_file_and_samples_end_with_them(tmp_path):
     """A hundred times the track's roughness: the train derails; nothing is written beyond that instant."""
     path = tmp_path / "run.h5"
-    told: list[str] = []
+    notes: list[str] = []
     with pytest.raises(RunFailedError, match=r"derailed|ran away"):
-        simulate.run(short(irregularity__scale=100.0), path, notify=told.append)
+        simulate.run(short(irregularity__scale=100.0), path, notify=notes.append)
     with simulate.open_result(path) as result:
         events = result.group("events")
         last = events["time"][-1]
@@ -181,8 +181,8 @@ def test_events_are_in_the_file_and_samples_end_with_them(tmp_path):
             time = result.group(group)["time"]
             assert last - 1.001e-3 <= time[-1] <= last + 1e-12
         assert np.isfinite(result.wheel()["normal_force"][:-5]).all()  # a check is at most five steps late
-    assert told
-    assert str(told[-1]).startswith(str(events["message"][-1]))
+    assert notes
+    assert str(notes[-1]).startswith(str(events["message"][-1]))
 
 
 def test_a_measured_track_that_is_never_reached_is_refused(tmp_path):

@@ -13,8 +13,7 @@ from tiengine import result as results
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.result import Result
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulation import simulate
-from tiengine.simulation import time_loop as march
+from tiengine.simulation import simulate, time_loop
 
 from ..models import V350
 
@@ -29,7 +28,7 @@ WHEEL_STEP, SHOT_STEP = 200, 250
 
 
 def chainage_of(step: int) -> float:
-    """Of the first vehicle's centre at the end of a step [m]."""
+    """Chainage of the first vehicle's centre at the end of a step [m]."""
     return START + V350 * DT * step
 
 
@@ -220,7 +219,7 @@ def test_rail_velocities_are_rates():
 
 def test_chunks_make_no_difference(result, monkeypatch):
     """The same bits in chunks of 137 steps as in one of 412."""
-    monkeypatch.setattr(march, "CHUNK_STEPS", 137)
+    monkeypatch.setattr(time_loop, "CHUNK_STEPS", 137)
     with result_of(gauges=[*GAUGES, FAR]) as other:
         for group in GROUPS:
             mine, theirs = result.group(group), other.group(group)
@@ -276,7 +275,7 @@ def test_files_open_in_xarray(tmp_path: Path):
 
 
 def test_a_train_that_fails_leaves_no_seats_that_it_never_passed(tmp_path: Path):
-    """What a derailed train does to the track in the end means nothing: seats in its window are left out."""
+    """Forces of a derailed train on the track mean nothing: seats in its window are left out."""
     path = tmp_path / "run.h5"
     wild = CASE | {"irregularity.scale": 100.0, "train.distance": 8.0}
     with pytest.raises(RunFailedError):

@@ -1,4 +1,4 @@
-"""A process of its own: march the paper's case and print a digest of every bit and some sums.
+"""A process of its own: advance the paper's case and print a digest of every bit and some sums.
 
 Usage: run_bits.py THREADS OPTIMISED STEPS, run as a module of the tests' folder.
 """
@@ -17,15 +17,15 @@ from tiengine.engine import backend
 
 
 def main(threads: int, optimised: bool, steps: int) -> None:
-    """March and print one line of JSON."""
+    """Advance and print one line of JSON."""
     if not optimised:
         init = ti.init
         ti.init = lambda **settings: init(**settings | {"advanced_optimization": False, "offline_cache": False})
     backend.start(threads)
     sys.path.insert(0, str(Path(__file__).parents[1]))
-    from reference.marching import march
+    from reference.stepping import run_steps
 
-    run = march("paper", dt=1e-4, duration=steps * 1e-4, parallel=True)
+    run = run_steps("paper", dt=1e-4, duration=steps * 1e-4, parallel=True)
     digest = hashlib.sha256(run.wheel.tobytes() + run.state.motion[:3].tobytes()).hexdigest()
     forces = np.stack([run.vertical[-1], run.lateral[-1]])
     print(json.dumps({"digest": digest, "forces": forces.tolist()}))

@@ -20,7 +20,7 @@ from tiengine.track.slab_matrices import SlabMatrices
 
 @dataclass
 class Seat:
-    """One fastening: where it is, what it feels, what it does (displacement and material rate)."""
+    """One fastening: its place, the motion at it (displacement and material rate), its forces."""
 
     number: int
     side: int

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import base64
 import re
-import subprocess
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -13,13 +11,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from tiengine import result as results
 from tiengine.cli.commands import main
 from tiengine.figures.catalogue import KINDS
 from tiengine.indices.key_figures import KeyFigure, key_figures, summarise
 from tiengine.indices.train_record import Train
 from tiengine.report.page import render
 from tiengine.report.scenario_words import scenario_words
+from tiengine.result_files.reader import RUNNING
 from tiengine.scenario.scenario import load_scenario
 
 from .. import hand_made as by
@@ -55,7 +53,7 @@ def file(tmp_path, monkeypatch) -> Path:
 @pytest.fixture
 def few_figures(monkeypatch):
     """One figure only, where a report's words are looked at."""
-    monkeypatch.setattr("tiengine.report.KINDS", [kind for kind in KINDS if kind.name in ("contact", "waterfall")])
+    monkeypatch.setattr("tiengine.report.page.KINDS", [kind for kind in KINDS if kind.name in ("contact", "waterfall")])
 
 
 def assert_refused(result: Result, message: str) -> None:
@@ -65,7 +63,7 @@ def assert_refused(result: Result, message: str) -> None:
 
 
 def test_plot_draws_what_the_file_gives(file):
-    """Seven kinds asked for, five drawn; the rest with the key to set."""
+    """Kinds that the file has the data for are drawn; the others name the key to set."""
     result = call("plot", file)
     assert result.exit_code == 0, result.output
     lines = dict(line.split(maxsplit=1) for line in result.stdout.splitlines())
@@ -121,7 +119,7 @@ def test_plot_refuses(file, arguments, message):
 
 
 def test_report_refuses(file):
-    """A page is no place for a result."""
+    """The page never replaces a result."""
     assert_refused(call("report", file, "-o", "run.h5"), "its suffix must be .html or .htm")
     assert_refused(call("report", file, "-o", "no/such/page.html"), "there is no folder")
     assert_refused(call("report", file, "--train", "7"), "must be from 0 to 0")
@@ -201,7 +199,7 @@ def test_names_in_a_file_are_only_text(tmp_path, few_figures):
     assert "script" not in page.texts
     assert EVIL in page.texts["h1"]
     assert "<script src=" in page.texts["pre"][0]
-    assert any(f"did not come to its end: {EVIL}" in words for words in page.texts["p"])
+    assert any(f"The run is not complete: {EVIL}" in words for words in page.texts["p"])
     assert sum(EVIL in words for words in page.texts["td"]) >= 3  # source, failure, event
     assert any(words.startswith("No indices: ") for words in page.texts["p"])
 
@@ -219,7 +217,7 @@ def test_report_of_many_trains(tmp_path, few_figures):
 
 
 def test_key_figures_of_a_poor_file(tmp_path, few_figures):
-    """What is not there is left out."""
+    """Key figures whose data the file lacks are left out."""
     with by.made(tmp_path / "a.h5", by.scenario(), {"body": by.body(np.zeros((300, 7, 5)))}) as result:
         assert key_figures(Train(result)) == []
         assert "The file holds neither wheel forces nor envelopes" in render(result)
@@ -246,13 +244,7 @@ def test_a_scenario_in_words():
     assert smooth["Trains"] == "3 realisations of the irregularity, train.speed_kmh in 3 values"
 
 
-def test_listing_does_not_import_matplotlib():
-    """The commands' names come without what they need: listing answers at once."""
-    code = "import sys, tiengine.cli; sys.exit('matplotlib' in sys.modules or 'jinja2' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
 def test_unfinished_files_are_drawn(tmp_path, few_figures):
-    """A run on its way: what is there so far, and a word about it."""
-    with by.made(tmp_path / "a.h5", by.scenario(), groups(300), status=results.RUNNING) as result:
-        assert "The run did not come to its end: running" in render(result)
+    """An unfinished run: its results so far, with a notice."""
+    with by.made(tmp_path / "a.h5", by.scenario(), groups(300), status=RUNNING) as result:
+        assert "The run is not complete: running" in render(result)

@@ -1,4 +1,4 @@
-"""Results in other programs' files: what is read back is what the result holds, and what cannot be is refused."""
+"""Exported files: reading them back gives the values of the result; impossible exports are refused."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ STEPS = 300
 
 
 def block(group: str, train: int) -> Block:
-    """Numbers that tell everything apart."""
+    """Values that differ between all channels and labels."""
     rows = ROWS.get(group, STEPS)
     rng = np.random.default_rng([sum(map(ord, group)), train])
     along = np.arange(rows) if group == "seats" else np.arange(1, rows + 1) * 2e-4 * STEPS / rows
@@ -185,7 +185,7 @@ def test_what_cannot_be_is_refused(result, tmp_path, output, options, said):
 
 
 def test_nothing_is_replaced_unasked(path, tmp_path):
-    """And a file that is asked to be is replaced at once or not at all."""
+    """With --force a file is replaced atomically."""
     output = tmp_path / "out.csv"
     output.write_text("mine", encoding="utf-8")
     arguments = ["export", str(path), "-o", str(output), "--channel", "wheel/vertical_force"]

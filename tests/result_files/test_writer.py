@@ -1,4 +1,4 @@
-"""Result files: the layout that other people's scripts rely on, and what becomes of a failed run."""
+"""Result files: the layout on which scripts of users rely, and the state after a failed run."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ import xarray
 from tiengine import result as results
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.channels import BODY, DOFS, IRREGULARITY, WHEEL
+from tiengine.result_files.layout import GroupSpec, TrainLabels
 from tiengine.result_files.output_file import check_output
-from tiengine.result_files.writer import GroupSpec, TrainLabels, Writer
+from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import load_scenario, to_toml
 
 STEP = 1e-4
@@ -35,7 +36,7 @@ SHAPES = {"wheel": (WHEELSETS, 2), "body": (BODIES, 5), "irregularity": (WHEELSE
 
 
 def samples(group: str, train: int, first: int, count: int) -> dict[str, np.ndarray]:
-    """Numbers that tell channel, train, sample and label apart."""
+    """Values that differ between channels, trains, samples and labels."""
     rng = np.random.default_rng([len(group), train])
     size = int(np.prod(SHAPES[group]))
     return {
@@ -58,7 +59,7 @@ def write(path: Path | None, *, trains: int = 1, chunks: tuple[int, ...] = (700,
                 body = {k: v[rare] for k, v in samples("body", train, first, count).items()}
                 writer.append(train, "body", time[rare], SPEED * time[rare], body)
             first += count
-        return writer.close({"dofs": 943, "time_step": STEP})
+        return results.Result.of(writer.close({"dofs": 943, "time_step": STEP}))
 
 
 def test_layout_is_the_interface(tmp_path: Path):
@@ -94,7 +95,7 @@ def test_times_are_linked_where_rates_agree(tmp_path: Path):
     write(path).close()
     with h5py.File(path) as file:
         train = file["trains/000"]
-        assert train["time"] == train["wheel/time"] == train["irregularity/time"]
+        assert train["wheel/time"] == train["irregularity/time"]
         assert train["irregularity/position"] == train["wheel/position"]
         assert train["body/time"] != train["wheel/time"]
         np.testing.assert_array_equal(train["body/time"], np.arange(201) * 10 * STEP)
@@ -152,7 +153,7 @@ def test_attributes_say_what_was_run(tmp_path: Path):
         a = result.attributes
         assert (a["format"], a["format_version"], a["seed"], a["dofs"], a["time_step"]) == (
             "tiengine",
-            1,
+            2,
             3,
             943,
             STEP,
@@ -222,7 +223,7 @@ def test_failure_at_the_last_moment_leaves_nothing(tmp_path: Path, monkeypatch: 
 
 
 def test_existing_file_needs_force(tmp_path: Path):
-    """Nobody loses an older result by accident."""
+    """An existing result is not overwritten by accident."""
     path = tmp_path / "run.h5"
     write(path, chunks=(10,)).close()
     with pytest.raises(InputError, match=r"run.h5': exists already; choose another name or --force"):
@@ -248,7 +249,7 @@ def test_unwritable_paths(tmp_path: Path):
 
 
 def test_wrong_channels_are_refused():
-    """A slip of the engine does not become a file: names and shapes are compared."""
+    """Names and shapes of channels are checked, so that an error in the engine does not reach the file."""
     time = np.arange(10) * STEP
     good = samples("wheel", 0, 0, 10)
     with Writer(None, "", {}, [LABELS], GROUPS) as writer:
@@ -270,8 +271,8 @@ def test_not_a_result(tmp_path: Path):
     with pytest.raises(InputError, match="its attribute format is not 'tiengine'"):
         results.open(tmp_path / "other.h5")
     with h5py.File(tmp_path / "other.h5", "r+") as file:
-        file.attrs.update({"format": "tiengine", "format_version": 2})
-    with pytest.raises(InputError, match="format_version = 2: this program reads 1"):
+        file.attrs.update({"format": "tiengine", "format_version": 3})
+    with pytest.raises(InputError, match="format_version = 3: this program reads 1 and 2"):
         results.open(tmp_path / "other.h5")
 
 

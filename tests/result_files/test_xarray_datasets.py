@@ -36,7 +36,7 @@ def write(path: Path | None, steps=(100, 100), dt=(1e-3, 1e-3), offsets=(OFFSETS
                 },
             )
             writer.describe(train, {"seed": 11 + train, "status": "complete" if count == 100 else "derailed"})
-        return writer.close({"status": "complete"})
+        return results.Result.of(writer.close({"status": "complete"}))
 
 
 @pytest.mark.parametrize("in_memory", [True, False])
@@ -55,7 +55,7 @@ def test_labels_units_and_values(tmp_path, in_memory):
 
 
 def test_channels_are_read_when_asked_for(tmp_path):
-    """What was loaded stays; what was not cannot be read from a closed file."""
+    """Loaded values remain; others cannot be read from a closed file."""
     with write(tmp_path / "a.h5") as result:
         wheel = result.to_xarray()
         kept = wheel.lateral_force.load()
@@ -66,7 +66,7 @@ def test_channels_are_read_when_asked_for(tmp_path):
 
 
 def test_ensemble_is_stacked():
-    """A train that failed is filled up; seats that a train did not pass as well."""
+    """A train that failed is filled with NaN, and so are seats that a train did not pass."""
     with write(None, steps=(100, 60), first=(0, 5)) as result:
         wheel = result.to_xarray("wheel", None)
         seats = result.to_xarray("seats", None)

@@ -151,6 +151,33 @@ def test_override_inside_a_list():
 
 
 @pytest.mark.parametrize(
+    ("setting", "key", "value"),
+    [
+        ("track.rail_profile=60E1", "rail_profile", "60E1"),  # a number in TOML: 60 times 10
+        ("track.rail_profile='60E1'", "rail_profile", "60E1"),
+        ("track.rail={like = '60E1'}", "rail", {"like": "60E1"}),
+        ("track.rail.like=60E1", "rail", {"like": "60E1"}),
+        ("track.slab.elements_x=18", "slab", {"like": "CRTS_III", "elements_x": 18}),
+        ("track.fastening.vertical_stiffness=5e7", "fastening", {"like": "ACE2021", "vertical_stiffness": 5e7}),
+    ],
+)
+def test_overrides_of_parts(setting, key, value):
+    """Names that look like numbers stay names; a key of a part that is left out changes the default part."""
+    for source in ("default", {"train": TRAIN}):
+        assert getattr(load_scenario(source, [setting]).track, key) == value
+
+
+def test_names_like_numbers():
+    """Every key that takes names only; keys that take a word or a number still read numbers."""
+    gauge = "gauges=[{name='1', on='rail', chainage=60.0, side='left'}]"
+    scenario = load_scenario("paper", ["name=2024", "irregularity.file=1e3", "numerics.window=1e2", gauge])
+    assert (scenario.name, Path(scenario.irregularity.file).name, scenario.gauges[0].name) == ("2024", "1e3", "1")
+    assert scenario.window_length == 100.0
+    assert "train.vehicles[0] = '60': no such preset" in refusal("paper", ["train.vehicles.0=60"])
+    assert "train.wheel_profile = 'true': no such preset" in refusal("paper", ["train.wheel_profile=true"])
+
+
+@pytest.mark.parametrize(
     ("text", "value"),
     [
         ("300", 300),

@@ -12,7 +12,7 @@ from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation import simulate
 from tiengine.vehicle.train import static_wheel_loads
 
-from ..reference.marching import KMH, march, model_of, scenario
+from ..reference.stepping import KMH, model_of, run_steps, scenario
 
 DEFECTS = (
     "track.failed_fastenings=[{rail = 'left', seats = [60, 62], factor = 0.0}]",
@@ -54,14 +54,14 @@ def assert_sane(vertical: np.ndarray, lateral: np.ndarray, static: float) -> Non
 )
 def test_stable(overrides, dt, duration):
     """The default step holds with many modes and at walking pace."""
-    run = march("default", *overrides, "irregularity.taper=5", dt=dt, duration=duration)
+    run = run_steps("default", *overrides, "irregularity.taper=5", dt=dt, duration=duration)
     assert_sane(run.vertical, run.lateral, run.model.constants[at.STATIC_LOAD])
     assert run.state.iterations.max() <= 12  # Newton's method is far from its limit of 25
 
 
 def test_walking_pace_is_quiet():
     """At 5 km/h on a smooth track nothing is excited: forces stay at the static load within 0.1 %."""
-    run = march("smooth", "train.speed_kmh=5", dt=2e-4, duration=0.5)
+    run = run_steps("smooth", "train.speed_kmh=5", dt=2e-4, duration=0.5)
     np.testing.assert_allclose(run.vertical, run.model.constants[at.STATIC_LOAD], rtol=1e-3)
 
 
@@ -80,7 +80,7 @@ def _largest_seat_forces(*overrides: str) -> np.ndarray:
         inside = (here >= 0) & (here < len(force))
         largest[inside] = np.maximum(largest[inside], np.abs(force[here[inside]]))
 
-    run = march("paper", *overrides, dt=2e-4, duration=0.4, each=each)
+    run = run_steps("paper", *overrides, dt=2e-4, duration=0.4, each=each)
     assert_sane(run.vertical, run.lateral, run.model.constants[at.STATIC_LOAD])
     return largest
 
@@ -116,7 +116,7 @@ def test_a_defect_under_the_first_window(defect):
     def each(_: int, stepper) -> None:
         inverses.append(set(stepper._odd))
 
-    run = march("paper", *track, dt=2e-4, duration=0.004, each=each)
+    run = run_steps("paper", *track, dt=2e-4, duration=0.004, each=each)
     first = {(int(slot), int(run.state.design[0, slot])) for slot in np.flatnonzero(run.state.design[0])}
     assert first
     assert all(found == first for found in inverses)
@@ -128,7 +128,7 @@ def test_no_tension_differs_only_where_the_bed_lets_go():
     density = "track.slab={like = 'CRTS_III', rho = %g}"
     light, heavy = (
         [
-            march("paper", density % rho, f"track.mortar_no_tension={free}", dt=2e-4, duration=0.3)
+            run_steps("paper", density % rho, f"track.mortar_no_tension={free}", dt=2e-4, duration=0.3)
             for free in ("false", "true")
         ]
         for rho in (250.0, 2.5e5)
@@ -176,7 +176,7 @@ def test_braking():
 
 def test_start_from_zero_rings():
     """Dropped on the track: wheels are unloaded at first, overshoot, and come back to the weight."""
-    run = march("smooth", dt=2e-4, duration=0.6, start="zero")
+    run = run_steps("smooth", dt=2e-4, duration=0.6, start="zero")
     force = run.vertical.mean(axis=(1, 2))
     static = run.model.constants[at.STATIC_LOAD]
     assert force[0] < 0.5 * static
@@ -187,7 +187,7 @@ def test_start_from_zero_rings():
 def test_the_papers_slab_count():
     """Eq. (16): 7 slabs in 36 m; wheel forces within 0.01 % of the peak of those with full cover (MODEL 2)."""
     paper, cover = (
-        march("paper", f"numerics.slab_count='{count}'", dt=2e-4, duration=0.4) for count in ("paper", "cover")
+        run_steps("paper", f"numerics.slab_count='{count}'", dt=2e-4, duration=0.4) for count in ("paper", "cover")
     )
     assert (paper.model.ingredients.slots, cover.model.ingredients.slots) == (7, 8)
     for kind in ("vertical", "lateral"):
@@ -246,7 +246,7 @@ def test_the_trial_tells_what_blows_up(modes, dt, passes, damping, stable):
     model = model_of("default", *overrides, dt=dt, passes=passes, fastening=stiffened)
     with np.errstate(all="ignore"):
         assert step_growth(model, 350.0 * KMH, 0.2 / dt).tolerable(0.2 / dt) == stable
-        run = march("default", *overrides, dt=dt, duration=0.2, model=model)
+        run = run_steps("default", *overrides, dt=dt, duration=0.2, model=model)
     bounded = (
         bool(np.isfinite(run.wheel).all())
         and np.abs(run.vertical).max() < 4.0 * static_wheel_loads(model.ingredients.train).max()

@@ -105,7 +105,7 @@ def test_keys_may_be_written_without_quotes():
 
 
 def test_measured_files_are_found_beside_the_scenario(tmp_path):
-    """As the key itself is."""
+    """Relative paths are resolved as for the key itself."""
     (tmp_path / "many.toml").write_text(
         '[train]\nvehicles = ["CRH380A_v2"]\nspeed_kmh = 100.0\ndistance = 10.0\n[ensemble]\nsize = 2\n'
         '[ensemble.vary]\n"irregularity.file" = ["a.csv", "b.csv"]\n'
@@ -185,7 +185,7 @@ def test_each_train_is_the_single_run_of_its_own_scenario():
 
 
 def test_file_of_an_ensemble():
-    """What holds for all trains stands at the root, what for one at its group."""
+    """Facts of all trains are at the root, those of one train at its group."""
     many = mixed()
     root, facts = many.attributes, [many.facts(train) for train in range(6)]
     assert (root["status"], root["trains"], many.failures) == ("complete", 6, {})
@@ -198,7 +198,7 @@ def test_file_of_an_ensemble():
 
 
 def test_defects_of_one_train():
-    """A missing row of fastenings under the first wheels is felt by the train that has it alone."""
+    """A missing row of fastenings under the first wheels affects only the train that has it."""
     failed = [[], [{"seats": [36, 40]}]]  # chainage 23 to 25.5 m, where the leading wheelset starts at 24 m
     scenario = ensemble(size=2, seeds=[5, 5], vary={"track.failed_fastenings": failed})
     with simulate.run(scenario, workers=1) as both:
@@ -289,13 +289,13 @@ def test_the_trains_of_a_killed_worker_are_begun_again():
             killed.append(int(multiprocessing.active_children()[0].pid or 0))
             os.kill(killed[0], signal.SIGKILL)
 
-    told: list[str] = []
-    with simulate.run(ensemble(**MIXED), workers=2, progress=kill, notify=told.append) as result:
+    notes: list[str] = []
+    with simulate.run(ensemble(**MIXED), workers=2, progress=kill, notify=notes.append) as result:
         assert not result.failures
         for train in range(6):
             assert_same_bits(result, mixed(), train)
-    # nothing is told if the killed one had sent all it had to
-    assert told in ([], ["a worker died (killed by SIGKILL); its 2 trains are started again"])
+    # no note if the killed one had sent everything
+    assert notes in ([], ["a worker died (killed by SIGKILL); its 2 trains are started again"])
     assert multiprocessing.active_children() == []
 
 

@@ -1,4 +1,4 @@
-"""What survives: a sample of ``python -m validation.faults``, and what it found, piece by piece."""
+"""Faults that a run survives: a sample of ``python -m validation.faults``, and its findings one by one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.result_files import journal
 from tiengine.result_files.checkpoint import Checkpoint, checkpoint_path, checkpoint_paths
 from tiengine.result_files.events import Event
-from tiengine.result_files.file_lock import locked, release
+from tiengine.result_files.file_lock import acquire_lock, release_lock
 from tiengine.result_files.journal import atomic_write, journal_of
 from tiengine.result_files.layout import Block, GroupSpec, TrainLabels
 from tiengine.result_files.writer import Writer
@@ -159,7 +159,7 @@ def test_a_file_that_only_looks_like_a_journal_is_left_alone(tmp_path):
 
 
 def test_a_journal_of_another_file_never_meets_a_new_one(tmp_path):
-    """Of a file that was removed by hand after a crash; the new one would be cut to its length."""
+    """The journal of a file that was removed by hand after a crash: the new file would be cut to its length."""
     path = tmp_path / "run.h5"
     left_unfinished(path)
     journal_of(path).write_bytes(journal._journal(4096, [(0, bytearray(4096))]))
@@ -213,10 +213,10 @@ def test_a_reader_does_not_wait_for_a_writer_for_ever(tmp_path, monkeypatch):
     path = tmp_path / "run.h5"
     left_unfinished(path)
     atomic_write(journal_of(path), journal._journal(path.stat().st_size, []))
-    lock = locked(path)
+    lock = acquire_lock(path)
     with results.open(path) as result:
         assert not result.finished
-    release(lock)
+    release_lock(lock)
     assert journal_of(path).exists()
 
 
@@ -236,7 +236,7 @@ def test_a_full_disk_is_one_sentence_and_keeps_what_was_committed(tmp_path, monk
         if doing == "add":
             writer.add(1, LABELS, {"status": "running"})
         elif doing == "note":
-            writer.note(0, [Event("wheel_lift", 0.1, 1.0, 1, "left", "x" * 100_000, False)])
+            writer.add_events(0, [Event("wheel_lift", 0.1, 1.0, 1, "left", "x" * 100_000, False)])
         elif doing == "write":
             write(writer, 600, 5000)
         else:
@@ -296,7 +296,7 @@ def test_a_signal_may_come_in_the_middle_of_printing(capfd):
     with cli_run._stopped_by_signals(Busy()) as stop:
         os.kill(os.getpid(), signal.SIGTERM)
         assert stop.number == signal.SIGTERM
-    assert "once more to leave at once" in capfd.readouterr().err
+    assert "a second signal exits at once" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(

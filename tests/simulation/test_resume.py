@@ -61,8 +61,8 @@ def assert_same(a: Path, b: Path) -> None:
 
 def stopped_after(chunks: int):
     """Asks to stop after so many questions, which come once a chunk."""
-    asked = count(1)
-    return lambda: next(asked) >= chunks
+    calls = count(1)
+    return lambda: next(calls) >= chunks
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +107,11 @@ def test_checkpoints_are_written_as_often_as_asked(tmp_path: Path):
         seen.extend(Checkpoint.read(path).facts["done"] for path in checkpoint_paths(tmp_path / "run.h5"))
 
     simulate.run(scenario(), tmp_path / "run.h5", progress=look, checkpoint=1e-9).close()
-    assert seen == [1000, 2000, 2000]  # asked before each chunk is saved, and with the rest of the envelopes at the end
+    assert seen == [
+        1000,
+        2000,
+        2000,
+    ]  # called before each chunk is saved, and with the remainder of the envelopes at the end
     assert checkpoint_paths(tmp_path / "run.h5") == []
 
 
@@ -125,7 +129,7 @@ def test_an_ensemble_goes_on_with_other_workers(tmp_path: Path):
 
 
 def test_only_an_unfinished_result_is_resumed(whole: Path, tmp_path: Path):
-    with pytest.raises(InputError, match="is complete; there is nothing to resume"):
+    with pytest.raises(InputError, match="the run is complete; there is nothing to resume"):
         simulate.resume(whole)
     with pytest.raises(InputError, match="no such file"):
         simulate.resume(tmp_path / "none.h5")
@@ -135,7 +139,7 @@ def test_an_unfinished_result_is_not_replaced_by_accident(tmp_path: Path):
     path = tmp_path / "run.h5"
     with pytest.raises(RunStoppedError):
         simulate.run(scenario(), path, stop=stopped_after(1))
-    with pytest.raises(InputError, match="it is an unfinished run: continue it by `tiengine resume"):
+    with pytest.raises(InputError, match="it is an unfinished run: resume it with `tiengine resume"):
         simulate.run(scenario(), path)
 
 

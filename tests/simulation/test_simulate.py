@@ -16,7 +16,7 @@ from tiengine.kernels import layout as at
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation import simulate
 
-from ..reference.marching import KMH, March, march, model_of
+from ..reference.stepping import KMH, History, model_of, run_steps
 
 SPEED = 350.0 * KMH
 SEAT_PITCH, SLAB_PITCH = 0.63, 5.67
@@ -24,19 +24,19 @@ SETTLED = 0.2  # s: three and a half slabs after the start
 
 
 @pytest.fixture(scope="module")
-def smooth() -> tuple[March, NDArray[np.float64]]:
+def smooth() -> tuple[History, NDArray[np.float64]]:
     """One second on the smooth track, and the balance of forces of every rail; see ``balanced``."""
     return balanced("smooth", duration=1.0)
 
 
-def balanced(name: str, *overrides: str, duration: float) -> tuple[March, NDArray[np.float64]]:
-    """A march at 2e-4 s with, per step, the sum of fastening forces and the inertia of each rail.
+def balanced(name: str, *overrides: str, duration: float) -> tuple[History, NDArray[np.float64]]:
+    """A run at 2e-4 s with, per step, the sum of fastening forces and the inertia of each rail.
 
     The material momentum of a rail is m int (dw/dt - V w') ds; its w vanishes at both ends, so its rate is
     m sum_i a_i int phi_i ds. What the pinned ends carry is left out of the balance.
 
     Returns:
-        The march, and forces [N], shape (steps, fastenings or inertia, vertical or lateral, rail).
+        Its history, and forces [N], shape (steps, fastenings or inertia, vertical or lateral, rail).
     """
     model = model_of(name, *overrides, dt=2e-4)
     knots = model.functions.knots
@@ -55,7 +55,7 @@ def balanced(name: str, *overrides: str, duration: float) -> tuple[March, NDArra
         ]
         rows.append([fastenings, inertia])
 
-    run = march(name, *overrides, dt=2e-4, duration=duration, model=model, each=each)
+    run = run_steps(name, *overrides, dt=2e-4, duration=duration, model=model, each=each)
     return run, np.array(rows)
 
 
@@ -143,7 +143,7 @@ def test_fastenings_and_inertia_carry_the_wheels_on_a_rough_track():
 
 def test_wheels_carry_the_train_and_its_inertia():
     """Newton's law for all bodies together, vertically and laterally, at every step: rounding only."""
-    run = march("default", dt=2e-4, duration=0.4)
+    run = run_steps("default", dt=2e-4, duration=0.4)
     train = run.model.ingredients.train
     mass, weight = np.diag(train.M)[: train.n_dof], train.gravity[1 : train.n_dof : 5].sum()
     acceleration = run.body[:, 2]
@@ -198,17 +198,17 @@ def test_forces_have_the_expected_size(file):
 
 
 def test_two_ways_of_reading_agree(file):
-    """``tiengine.open`` and the irregularity that the wheels felt."""
+    """``tiengine.open`` and the irregularity under the wheels."""
     import tiengine
     from tiengine.irregularity.irregularity import at_wheels, make_irregularity
 
     with tiengine.open(file) as result:
-        felt, wheel = result.irregularity(), result.wheel()
+        irregularity, wheel = result.irregularity(), result.wheel()
         scenario = result.scenario
         assert result.attributes["status"] == "complete"
-    assert set(felt) >= {"time", "vertical", "lateral"}
+    assert set(irregularity) >= {"time", "vertical", "lateral"}
     lead = 18.0 + float(wheel["wheelset_offset"].max())
     track = make_irregularity(scenario.irregularity, lead)
     rails = at_wheels(track.sample(wheel["position"][::100, None] + wheel["wheelset_offset"]))
-    np.testing.assert_allclose(felt["vertical"][::100], rails[..., 0], atol=1e-9)  # single precision of 5 mm
-    np.testing.assert_allclose(felt["lateral"][::100], rails[..., 1], atol=1e-9)
+    np.testing.assert_allclose(irregularity["vertical"][::100], rails[..., 0], atol=1e-9)  # single precision of 5 mm
+    np.testing.assert_allclose(irregularity["lateral"][::100], rails[..., 1], atol=1e-9)

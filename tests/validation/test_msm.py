@@ -23,12 +23,12 @@ SHORT = (
     "irregularity.taper=10",
     'output.precision="double"',
 )
-ALL = 200  # plate modes: more than the mesh has
+ALL = 200  # more plate modes than the mesh has
 
 
 @pytest.mark.parametrize("modes", [5, 9, 13, 14, 33])
 def test_seat_sums_are_those_of_the_sines(modes):
-    """Below, at and beyond the seats' own frequencies; rounding of sums of up to 33 terms of order one."""
+    """Modes below, at and beyond the number of seats; tolerance: rounding of sums of up to 33 terms of order one."""
     seats = 7
     transform = SeatTransform.of(seats, modes)
     sines = np.sin(np.outer(np.arange(1, modes + 1), np.pi * (np.arange(seats) + 0.5) / seats))
@@ -41,7 +41,7 @@ def test_seat_sums_are_those_of_the_sines(modes):
 
 
 def test_plate_is_the_engines_plate_assembled_apart():
-    """Same element, other code: monomials here, shape functions in the engine's kernels; rounding of K's spread."""
+    """Both codes have the same element, from monomials and from shape functions; tolerance: rounding of K's spread."""
     slab, mortar = load_slab("CRTS_III")
     ours = slab_matrices(slab, mortar)
     mesh = _Mesh(slab.elements_x, slab.elements_y, slab.length / 18, slab.width / 4)
@@ -82,9 +82,9 @@ def _window(*overrides: str):
 
 @pytest.mark.parametrize("direction", ["vertical_force", "lateral_force"])
 def test_window_and_full_length_agree(direction):
-    """0.2 % of the peak on a rough track at the same modes a metre: what the window's ends change (MODEL 9).
+    """Forces agree within 0.2 % of the peak, the effect of the window's ends, at the same modes per metre (MODEL 9).
 
-    No wheel lifts off in these 15 m: at the blow that ends a flight both programs err by their own step first.
+    No wheel lifts off in these 15 m: at an impact the step errors of both programs would dominate.
     """
     full, window = _full()[direction], _window()[direction]
     assert len(full) == len(window) > 1400
@@ -92,8 +92,8 @@ def test_window_and_full_length_agree(direction):
     assert np.abs(full - window).max() < 2e-3 * np.abs(full).max()
 
 
-def test_failed_fastenings_and_a_void_are_felt_alike():
-    """As above on a smooth track, over three failed fastenings and four elements of a slab without mortar."""
+def test_failed_fastenings_and_a_void_act_alike():
+    """They agree likewise over three failed fastenings and four elements without mortar, on a smooth track."""
     defects = (
         "irregularity.spectrum='none'",
         'track.failed_fastenings=[{rail="left", seats=[62, 64], factor=0.0}]',
@@ -102,7 +102,7 @@ def test_failed_fastenings_and_a_void_are_felt_alike():
     full, window = (x["vertical_force"] for x in (_full(*defects), _window(*defects)))
     peak = np.abs(full).max()
     assert np.abs(full - window).max() < 2e-3 * peak
-    assert np.ptp(full) > peak / 3.0  # the defects are felt
+    assert np.ptp(full) > peak / 3.0  # the defects have an effect
 
 
 @pytest.mark.parametrize(

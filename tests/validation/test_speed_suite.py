@@ -1,4 +1,4 @@
-"""The speed suite's data and verdicts; what is fast is for the suite itself to say."""
+"""Data and verdicts of the speed suite, without measuring any speed."""
 
 import json
 import re
@@ -74,7 +74,7 @@ def test_verdicts(key, measured, met):
 
 def test_a_limit_shows_measured_numbers_and_says_what_is_missing():
     (row,) = findings.rows({"one_train": case({"rtf": 0.5, "us_per_step": 100.4})})
-    assert row.limit.startswith("100 us a step")
+    assert row.limit.startswith("100 µs per step")
     assert findings.MISSING in row.limit  # the roofline's
 
 

@@ -1,4 +1,4 @@
-"""The validation table: verdicts, and outcomes that are kept from run to run."""
+"""Validation table: verdicts, and outcomes that are kept from run to run."""
 
 from dataclasses import replace
 

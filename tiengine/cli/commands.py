@@ -1,7 +1,7 @@
-"""Command line: ``tiengine profile``, ``contact``, ``list``; cli_run has those that simulate, cli_results the readers.
+"""Command line: ``tiengine profile``, ``contact`` and ``list``, and the group to which all commands belong.
 
-Bad input ends with one line on stderr and exit status 2, a run that fails on its way with status 1. Taichi is imported
-only by ``run`` and ``profile``, so that the others answer at once.
+Invalid input ends with one line on stderr and exit status 2, a failed run with status 1. Only commands that simulate
+import Taichi, so that the others start fast.
 """
 
 from __future__ import annotations
@@ -9,29 +9,40 @@ from __future__ import annotations
 import math
 import os
 import signal
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
-from tiengine.cli import reading as cli_results
-from tiengine.cli import simulating as cli_run
+from tiengine.cli import reading, simulating
 from tiengine.cli.screen import print_rows, show
-from tiengine.parameters.errors import InputError
+from tiengine.parameters.errors import InputError, InputNote
 from tiengine.parameters.presets import KINDS, preset_names, preset_source
 
 __all__ = ["main"]
 
 
 class _Commands(click.Group):
-    """Turns bad input into one line and exit status 2."""
+    """Group of commands that reports invalid input in one line (exit status 2) and notes on input, one line each."""
 
     def invoke(self, context: click.Context) -> Any:
-        """Run the command."""
+        """Run a command."""
         try:
-            return super().invoke(context)
+            with warnings.catch_warnings():
+                warnings.simplefilter("always", InputNote)
+                show_others = warnings.showwarning
+
+                def show_note(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+                    if issubclass(category, InputNote):
+                        click.echo(f"note: {' '.join(str(message).split())}", err=True)
+                    else:
+                        show_others(message, category, *place, **more)
+
+                warnings.showwarning = show_note
+                return super().invoke(context)
         except InputError as error:
             click.echo(f"error: {' '.join(str(error).split())}", err=True)
             context.exit(2)
@@ -47,11 +58,17 @@ def main() -> None:
 @main.command()
 @click.argument("scenario", default="paper")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key: train.speed_kmh=300")
-@click.option("--trains", type=click.IntRange(1), help="Trains advanced together; default: the scenario's.")
+@click.option(
+    "--trains", type=click.IntRange(1), help="Number of trains advanced together; default: as in the scenario."
+)
 @click.option("--seconds", type=float, default=1.0, show_default=True, help="Simulated time to measure.")
-@click.option("--steps", type=click.IntRange(2), help="Steps to measure instead.")
-@click.option("--json", "file", type=click.Path(path_type=Path), help="Write the report here too, replacing a file.")
-@click.option("--compare", nargs=2, type=click.Path(path_type=Path), help="Set two such files side by side instead.")
+@click.option("--steps", type=click.IntRange(2), help="Number of steps to measure, instead of --seconds.")
+@click.option(
+    "--json", "file", type=click.Path(path_type=Path), help="Also write the report to this file, replacing it."
+)
+@click.option(
+    "--compare", nargs=2, type=click.Path(path_type=Path), help="Compare two such files instead of measuring."
+)
 def profile(
     scenario: str,
     settings: Sequence[str],
@@ -61,7 +78,7 @@ def profile(
     file: Path | None,
     compare: tuple[Path, Path] | None,
 ) -> None:
-    """Measure where the time of SCENARIO's loop goes, stage by stage, in this process."""
+    """Measure the wall time of each stage of the time loop of SCENARIO, in this process."""
     from tiengine.profiling import report as profile_report
     from tiengine.profiling import tables as profile_tables
 
@@ -83,7 +100,7 @@ def profile(
     from tiengine.profiling import profile as profiling
 
     try:
-        with _ended_by_sigterm():
+        with _exit_on_sigterm():
             report = profiling.profile(resolved, trains=trains, seconds=seconds, steps=steps)
     except RunFailedError as failure:
         click.echo(f"run failed: {failure}", err=True)
@@ -96,47 +113,59 @@ def profile(
 @main.command()
 @click.argument("wheel")
 @click.argument("rail")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Draw a figure, replacing a file.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Draw a figure to this file, replacing it.")
 @click.option("--json", "as_json", is_flag=True, help="Print all numbers as JSON.")
 @click.option("--cant", type=float, default=0.025, show_default=True, help="Inclination of the rail.")
-@click.option("--canted", is_flag=True, help="The rail's points are inclined already.")
+@click.option("--canted/--upright", default=None, help="The rail's points are inclined already, or not.")
 @click.option("--gauge", type=float, default=1.435, show_default=True, help="[m]")
 @click.option("--gauge-depth", type=float, default=0.016, show_default=True, help="Below the rail's top [m].")
 @click.option("--half-spacing", type=float, default=0.7465, show_default=True, help="Of the tape circles [m].")
 @click.option("--wheel-radius", type=float, default=0.43, show_default=True, help="At the tape circle [m].")
-@click.option("--tape-circle", type=float, default=0.0, help="Outward from the wheel file's y = 0 [m].")
+@click.option("--tape-circle", type=float, help="Distance of the tape circle outward from the wheel file's y = 0 [m].")
+@click.option("--allow-kinks", is_flag=True, help="Accept kinks where wheel and rail can touch.")
 @click.option("--mirror-rail/--no-mirror-rail", default=None, help="The rail's gauge face is at positive y, or not.")
 @click.option("--smoothing", type=click.FloatRange(0.0, 5e-3), help="Of points; 0.0005 for measured profiles [m].")
+@click.option(
+    "--method",
+    type=click.Choice(["harmonic", "en15302"]),
+    default="harmonic",
+    show_default=True,
+    help="Equivalent conicity by harmonic linearisation, or by the integral of EN 15302 (without roll).",
+)
 @click.option("--largest", type=float, default=0.008, show_default=True, help="Largest shift [m].")
 def contact(
     wheel: str,
     rail: str,
     output: Path | None,
     as_json: bool,
-    canted: bool,
-    tape_circle: float,
+    canted: bool | None,
+    tape_circle: float | None,
+    allow_kinks: bool,
     mirror_rail: bool | None,
     smoothing: float | None,
     largest: float,
+    method: Literal["harmonic", "en15302"],
     **placement: float,
 ) -> None:
-    """Show how WHEEL and RAIL, presets or files, touch: rolling radii, conicity, points of contact."""
-    from tiengine.contact.profile import ROUNDING_LENGTH, load_profile
+    """Evaluate the contact geometry of WHEEL and RAIL, presets or files: rolling radii, conicity, contact points."""
+    from tiengine.contact.point_list import ROUNDING_LENGTH
+    from tiengine.contact.profile import load_profile
     from tiengine.contact.table import ContactSettings
     from tiengine.parameters.quantity import build
     from tiengine.report.contact_report import contact_report, draw
     from tiengine.result_files.output_file import check_output
 
     length = ROUNDING_LENGTH if smoothing is None else smoothing
-    if not math.isfinite(length):  # click takes it for one within the range
+    if not math.isfinite(length):  # click accepts NaN as within the range
         raise InputError(f"smoothing = {length}: must be a finite number")
     if output is not None:
         check_output(output, force=True)
     report = contact_report(
-        load_profile(wheel, "wheel", smoothing=length, tape_circle=tape_circle),
-        load_profile(rail, "rail", smoothing=length, has_cant=canted, mirror=mirror_rail),
+        load_profile(wheel, "wheel", smoothing=length, tape_circle=tape_circle, allow_kinks=allow_kinks),
+        load_profile(rail, "rail", smoothing=length, has_cant=canted, mirror=mirror_rail, allow_kinks=allow_kinks),
         build(ContactSettings, placement, "contact"),
         largest,
+        method,
     )
     if output is not None:
         draw(report, output)
@@ -149,19 +178,19 @@ def contact(
 @main.command("list")
 @click.argument("kind", type=click.Choice(KINDS), required=False)
 def list_presets(kind: str | None) -> None:
-    """List the presets of the library and where their numbers come from."""
+    """List the presets of the library and the sources of their values."""
     for each in (kind,) if kind else KINDS:
         click.secho(each, bold=True)
         print_rows([(f"  {name}", preset_source(each, name)) for name in preset_names(each)])
 
 
-for _command in (*cli_run.COMMANDS, *cli_results.COMMANDS):
+for _command in (*simulating.COMMANDS, *reading.COMMANDS):
     main.add_command(_command)
 
 
 @contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """Let a termination signal unwind the stack, so that no half file is left behind."""
+def _exit_on_sigterm() -> Iterator[None]:
+    """Turn a termination signal into SystemExit, so that no incomplete file remains."""
 
     def leave(number: int, frame: object) -> None:
         raise SystemExit(128 + number)

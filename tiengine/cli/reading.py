@@ -1,29 +1,35 @@
-"""Commands that read results: ``tiengine info``, ``metrics``, ``plot``, ``report``; none of them needs Taichi to begin.
-
-:data:`COMMANDS` joins the group of :mod:`tiengine.cli.commands`.
-"""
+"""Commands that read results: ``tiengine info``, ``metrics``, ``plot``, ``report``, ``export``; none imports Taichi."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from tiengine.cli.screen import print_rows, show
 from tiengine.figures.catalogue import COMPARE, names
+from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import parse_toml
 from tiengine.result_files.summary import SUMMARY, summary
 
+if TYPE_CHECKING:
+    from tiengine.indices.metrics import Metrics
+    from tiengine.vehicle.connector import VehicleClass
+
 __all__ = ["COMMANDS"]
+
+CLASSES = ("coach", "locomotive", "freight")
+TEXT_FILES = (".csv", ".txt")
 
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 def info(file: Path) -> None:
-    """Say what a result FILE holds and how it was made."""
+    """Describe the contents and the origin of a result FILE."""
     from tiengine import result as results
 
     with results.open(file) as result:
@@ -44,18 +50,39 @@ def info(file: Path) -> None:
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--train", type=click.IntRange(0), help="One train of an ensemble; default: all, summarised.")
-@click.option("--json", "output", type=click.Path(path_type=Path), help="Write all indices here too, replacing a file.")
-def metrics(file: Path, train: int | None, output: Path | None) -> None:
-    """Indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 for a result FILE, beside their limits."""
-    from tiengine import result as results
+@click.option("--train", type=click.IntRange(0), help="Index of one train of an ensemble; default: summary of all.")
+@click.option(
+    "--json", "output", type=click.Path(path_type=Path), help="Also write all indices to this file, replacing it."
+)
+@click.option("--class", "vehicle_class", type=click.Choice(CLASSES), help="Class of the vehicles, for their limits.")
+@click.option("--column", "columns", multiple=True, metavar="SIGNAL=COLUMN", help="Column of a text file; repeatable.")
+@click.option("--rate", type=float, help="Samples per second of a text file [Hz]; default: its column time.")
+@click.option("--speed", type=float, help="Speed in a text file [km/h]; default: from its column position.")
+@click.option("--static-load", type=float, help="Static wheel load [kN], for wheel forces of a text file.")
+@click.option("--run-in", type=float, help="Distance that is left out at the start of a text file [m].")
+def metrics(
+    file: Path,
+    train: int | None,
+    output: Path | None,
+    vehicle_class: VehicleClass | None,
+    columns: Sequence[str],
+    **measured: float | None,
+) -> None:
+    """Evaluate the indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631, with their limits.
+
+    FILE is a result, or a text file (.csv, .txt) of measured signals (docs/indices.md).
+    """
     from tiengine.report import metrics_table
     from tiengine.result_files.output_file import check_output
 
     if output is not None:
         check_output(output, force=True)
-    with results.open(file) as result:
-        found = result.metrics(train)
+    if file.suffix.lower() in TEXT_FILES:
+        if train is not None:
+            raise InputError(f"--train: {file} holds the signals of one vehicle")
+        found = _measured_metrics(file, columns, vehicle_class, **measured)
+    else:
+        found = _recorded_metrics(file, train, vehicle_class, columns, measured)
     if output is not None:
         output.write_text(found.to_json() + "\n", encoding="utf-8")
     show(metrics_table.metrics_table(found))
@@ -63,12 +90,18 @@ def metrics(file: Path, train: int | None, output: Path | None) -> None:
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Ends in .csv, .parquet or .mat.")
-@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Train of an ensemble.")
-@click.option("--channel", "channels", multiple=True, help="GROUP or GROUP/CHANNEL; may be repeated; default: wheel.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="File to write, ending in .csv, .parquet or .mat.",
+)
+@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Index of the train.")
+@click.option("--channel", "channels", multiple=True, help="GROUP or GROUP/CHANNEL; can be repeated; default: wheel.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def export(file: Path, output: Path, train: int, channels: Sequence[str], force: bool) -> None:
-    """Write channels of a result FILE as CSV, Parquet or MATLAB (docs/results.md)."""
+    """Export channels of a result FILE to CSV, Parquet or MATLAB (docs/results.md)."""
     from tiengine import result as results
     from tiengine.result_files import export as exporting
 
@@ -80,11 +113,13 @@ def export(file: Path, output: Path, train: int, channels: Sequence[str], force:
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.argument("kind", type=click.Choice(names()), required=False)
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Figure (.png, .pdf, .svg) or folder.")
-@click.option("--with", "other", type=click.Path(path_type=Path), help="Second file, of kind compare.")
-@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="One train of an ensemble.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Figure to write (.png, .pdf, .svg), or a folder."
+)
+@click.option("--with", "other", type=click.Path(path_type=Path), help="Second result, for the kind compare.")
+@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Index of the train.")
 def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, train: int) -> None:
-    """Draw figures of a result FILE: one KIND, or all that it can give, into FILE_KIND.png; replaces figures."""
+    """Draw one KIND of figure of a result FILE, or all available ones, as FILE_KIND.png; replaces existing figures."""
     from tiengine import result as results
     from tiengine.figures.files import draw_all, draw_one
 
@@ -101,11 +136,11 @@ def plot(file: Path, kind: str | None, output: Path | None, other: Path | None, 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Page to write, replacing one; FILE.html if none."
+    "-o", "--output", type=click.Path(path_type=Path), help="Page to write, replacing it; default: FILE.html."
 )
-@click.option("--train", type=click.IntRange(0), help="Whose figures; default: the first that ran to its end.")
+@click.option("--train", type=click.IntRange(0), help="Index of the train to draw; default: the first complete one.")
 def report(file: Path, output: Path | None, train: int | None) -> None:
-    """Make one HTML page of a result FILE: scenario, key figures, indices and figures; it needs no network."""
+    """Write a self-contained HTML page of a result FILE: scenario, key figures, indices and figures."""
     from tiengine import result as results
     from tiengine.report import page as reporting
 
@@ -120,9 +155,9 @@ def _text(value: Any) -> str:
 
 
 def _groups(train: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Name of every group of a train, with its samples and channels."""
+    """Name of each group of a train, with its number of samples and its channels."""
     for name, group in train.items():
-        if not hasattr(group, "keys"):  # the train's own time is a dataset
+        if not hasattr(group, "keys"):  # format version 1 has a dataset "time" here
             continue
         channels = {key: dataset for key, dataset in group.items() if "coordinates" in dataset.attrs}
         if channels:
@@ -134,4 +169,57 @@ def _groups(train: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
             yield from _groups(group, f"{prefix}{name}/")
 
 
+def _recorded_metrics(
+    file: Path,
+    train: int | None,
+    vehicle_class: VehicleClass | None,
+    columns: Sequence[str],
+    measured: dict[str, float | None],
+) -> Metrics:
+    """Indices of a result file, to which options of text files do not apply."""
+    from tiengine import result as results
+
+    given = [name for name, value in {"column": columns or None, **measured}.items() if value is not None]
+    if given:
+        raise InputError(f"--{given[0].replace('_', '-')}: only for text files ({', '.join(TEXT_FILES)}), not {file}")
+    with results.open(file) as result:
+        return result.metrics(train, vehicle_class=vehicle_class)
+
+
+def _measured_metrics(
+    file: Path,
+    columns: Sequence[str],
+    vehicle_class: VehicleClass | None,
+    *,
+    rate: float | None,
+    speed: float | None,
+    static_load: float | None,
+    run_in: float | None,
+) -> Metrics:
+    """Indices of measured signals."""
+    from tiengine.indices.measured_ride import measured_ride
+    from tiengine.indices.metrics import Metrics, train_metrics
+
+    pairs = [entry.partition("=") for entry in columns]
+    for signal, sign, column in pairs:
+        if not sign or not signal.strip() or not column.strip():
+            raise InputError(f"--column {signal}{sign}{column}: must be SIGNAL=COLUMN")
+    for name, value in (("rate", rate), ("speed", speed), ("static-load", static_load)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise InputError(f"--{name} {value:g}: must be a finite number > 0")
+    if run_in is not None and not 0.0 <= run_in < math.inf:
+        raise InputError(f"--run-in {run_in:g}: must be a finite number >= 0")
+    ride = measured_ride(
+        file,
+        {signal.strip(): column.strip() for signal, _, column in pairs},
+        rate=rate,
+        speed=None if speed is None else speed / 3.6,
+        run_in=run_in or 0.0,
+        static_load=None if static_load is None else 1e3 * static_load,
+        vehicle_class=vehicle_class,
+    )
+    return Metrics(str(file), (train_metrics(ride),), {})
+
+
 COMMANDS = (info, metrics, plot, report, export)
+"""Added to the group of :mod:`tiengine.cli.commands`."""

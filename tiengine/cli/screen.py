@@ -1,4 +1,4 @@
-"""Words and values on the screen: what the commands of the command line share."""
+"""Output of tables on the screen or into a pipe."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from rich.table import Table
 
 __all__ = ["PIPE_WIDTH", "print_rows", "show"]
 
-PIPE_WIDTH = 120  # columns where there is no terminal
+PIPE_WIDTH = 120  # columns if there is no terminal
 
 
 def print_rows(rows: Sequence[tuple[str, str]]) -> None:
-    """Two columns; folded on a terminal, one line a row for a pipe."""
+    """Print two columns, wrapped on a terminal; one line per row into a pipe."""
     if not sys.stdout.isatty():
         width = max((len(name) for name, _ in rows), default=0)
         for name, text in rows:
@@ -31,7 +31,7 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
 
 
 def show(content: RenderableType) -> None:
-    """Print to stdout, as wide as the terminal."""
+    """Print to stdout in the width of the terminal."""
     console = Console(highlight=False)
     if not console.is_terminal:
         console = Console(highlight=False, width=PIPE_WIDTH)

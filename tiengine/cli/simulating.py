@@ -1,7 +1,7 @@
 """Commands that simulate: ``tiengine run`` and ``tiengine resume``.
 
-Exit status 0: all trains came to their end; 1: a train failed; 2: bad input, or the disk is full; 128 + n: stopped by
-signal n (130 Ctrl-C, 143 SIGTERM), to be resumed.
+Exit status 0: all trains are complete; 1: a train failed; 2: invalid input, or the disk is full; 128 + n: stopped by
+signal n (130 Ctrl-C, 143 SIGTERM), can be resumed.
 """
 
 from __future__ import annotations
@@ -29,20 +29,27 @@ __all__ = ["COMMANDS"]
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
-_workers = click.option("--workers", type=click.IntRange(1), help="Processes for an ensemble; default: one a core.")
+_workers = click.option(
+    "--workers", type=click.IntRange(1), help="Worker processes for an ensemble; default: one per core."
+)
 _checkpoint = click.option(
     "--checkpoint",
     type=click.FloatRange(0.0, min_open=True),
     default=60.0,
     show_default=True,
-    help="Wall time between two checkpoints [s].",
+    help="Wall time between checkpoints [s].",
 )
-_quiet = click.option("--quiet", is_flag=True, help="Print nothing but errors.")
+_quiet = click.option("--quiet", is_flag=True, help="Print errors only.")
 
 
 @click.command()
 @click.argument("scenario")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Result file; default: the scenario's name.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Result file; default: NAME.h5 with the name of the scenario.",
+)
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a key: train.speed_kmh=300")
 @_workers
 @_checkpoint
@@ -57,7 +64,7 @@ def run(
     quiet: bool,
     force: bool,
 ) -> None:
-    """Simulate SCENARIO, the name of a built-in one or the path of a TOML file: one train or an ensemble."""
+    """Simulate SCENARIO, the name of a preset or the path of a TOML file: one train or an ensemble."""
     from tiengine.scenario.scenario import load_scenario
 
     resolved = load_scenario(scenario, settings)
@@ -69,10 +76,11 @@ def run(
 
     from tiengine.simulation import simulate
 
-    _watched(
+    _run_on_screen(
         lambda **screen: simulate.run(resolved, path, force=force, workers=workers, checkpoint=checkpoint, **screen),
         path,
         resolved.name,
+        len(resolved.members),
         quiet,
     )
 
@@ -83,13 +91,19 @@ def run(
 @_checkpoint
 @_quiet
 def resume(file: Path, workers: int | None, checkpoint: float, quiet: bool) -> None:
-    """Go on with a run that was stopped or killed: the result FILE gets the bits of a run without a break."""
+    """Resume an interrupted run: its result FILE becomes bit for bit that of an uninterrupted run."""
+    from tiengine import result as results
+
+    with results.open(file) as unfinished:
+        trains = len(unfinished.scenario.members)
+
     from tiengine.simulation import simulate
 
-    _watched(
+    _run_on_screen(
         lambda **screen: simulate.resume(file, workers=workers, checkpoint=checkpoint, **screen),
         file,
         file.stem,
+        trains,
         quiet,
     )
 
@@ -97,23 +111,25 @@ def resume(file: Path, workers: int | None, checkpoint: float, quiet: bool) -> N
 COMMANDS = (run, resume)
 
 
-def _watched(simulation: Callable[..., Result], path: Path, name: str, quiet: bool) -> None:
-    """Run with a bar on the screen; say how it ended."""
+def _run_on_screen(simulation: Callable[..., Result], path: Path, name: str, trains: int, quiet: bool) -> None:
+    """Run a simulation with a progress bar and report its end."""
     from tiengine.parameters.errors import RunFailedError, RunStoppedError
 
     console = Console(stderr=True, quiet=quiet, highlight=False)
     with _stopped_by_signals(console) as stop:
         try:
-            with _progress(console, name) as progress:
+            with _progress(console, name, trains) as progress:
                 result = simulation(
-                    progress=progress, notify=lambda words: console.print(words, markup=False), stop=lambda: stop.asked
+                    progress=progress,
+                    notify=lambda words: console.print(words, markup=False),
+                    stop=lambda: stop.requested,
                 )
         except RunStoppedError as stopped:
-            how = f"go on by: tiengine resume {path}" if path.exists() else "nothing was computed yet"
+            how = f"resume with: tiengine resume {path}" if path.exists() else "nothing has been computed yet"
             click.echo(f"{stopped}; {how}", err=True)
             raise SystemExit(128 + stop.number) from None
         except RunFailedError as failure:
-            click.echo(f"run failed: {failure}; {path} holds what was computed until then", err=True)
+            click.echo(f"run failed: {failure}; {path} holds the results up to that time", err=True)
             raise SystemExit(1) from None
     with result:
         if not quiet:
@@ -127,29 +143,34 @@ def _watched(simulation: Callable[..., Result], path: Path, name: str, quiet: bo
 
 @dataclass
 class _Stop:
-    """Whether a signal has asked to stop, and which."""
+    """Stop request by a signal.
+
+    Attributes:
+        number: Number of the signal; 0 if there was none.
+    """
 
     number: int = 0
 
     @property
-    def asked(self) -> bool:
+    def requested(self) -> bool:
+        """Whether a signal has arrived."""
         return self.number > 0
 
 
 @contextmanager
 def _stopped_by_signals(console: Console) -> Iterator[_Stop]:
-    """Ctrl-C and SIGTERM ask to finish the chunk of steps; a second one ends the program at once."""
+    """Let Ctrl-C and SIGTERM request a stop after the current chunk of steps; a second signal exits at once."""
     stop = _Stop()
 
-    def ask(number: int, frame: Any) -> None:
-        if stop.asked:
+    def request(number: int, frame: Any) -> None:
+        if stop.requested:
             raise SystemExit(128 + number)
         stop.number = number
-        if not console.quiet:  # to the system: a handler may come in the middle of anything that prints
-            with suppress(OSError):  # a terminal that was closed
-                os.write(2, b"stopping after these steps; once more to leave at once\n")
+        if not console.quiet:  # by os.write: the handler may interrupt any print
+            with suppress(OSError):  # the terminal may be closed
+                os.write(2, b"stopping after the current steps; a second signal exits at once\n")
 
-    previous = {number: signal.signal(number, ask) for number in SIGNALS}
+    previous = {number: signal.signal(number, request) for number in SIGNALS}
     try:
         yield stop
     finally:
@@ -158,24 +179,24 @@ def _stopped_by_signals(console: Console) -> Iterator[_Stop]:
 
 
 @contextmanager
-def _progress(console: Console, name: str) -> Iterator[Callable[[float, float], None]]:
-    """A bar with simulated time, ETA and real-time factor, as the callback of a run."""
+def _progress(console: Console, name: str, trains: int) -> Iterator[Callable[[float, float], None]]:
+    """Progress bar with simulated time (of all trains), remaining time and real-time factor, as callback of a run."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.completed:.2f} of {task.total:.2f} s"),
         TextColumn("ETA"),
         TimeRemainingColumn(),
-        TextColumn("RTF {task.fields[factor]:.2f}"),
+        TextColumn("RTF {task.fields[factor]:.2f}" + (" per train" if trains > 1 else "")),
     )
     bar = Progress(*columns, console=console, transient=not console.is_terminal)
     task = bar.add_task(name, total=0.0, factor=0.0, start=False)
-    clock: list[float] = []  # the time of the first call: set-up is not part of the factor
+    clock: list[float] = []  # wall and simulated time at the first call: the set-up does not count in the factor
 
     def update(simulated_time: float, end_time: float) -> None:
         if not clock:
             clock.extend((time.perf_counter(), simulated_time))
-            bar.start()  # not before: a run refused at set-up leaves one line, its error
+            bar.start()  # not earlier: a run refused at set-up prints its error only
             bar.start_task(task)
         elapsed = time.perf_counter() - clock[0]
         factor = elapsed / max(simulated_time - clock[1], 1e-9)

@@ -10,7 +10,8 @@ from tiengine.engine.chunk import Chunk
 from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.stability import of_trains, step_growth, with_stiffest_seats
 from tiengine.engine.vector_mode import lanes_for
-from tiengine.irregularity.irregularity import IrregularityParams, check_step, shortest_wavelength
+from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.track_checks import check_step, shortest_wavelength
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
@@ -52,7 +53,7 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     for dt in AUTO_STEPS if wanted == "auto" else (float(wanted),):
         try:
             check_wavelength(scenario, dt)
-            check_step(shortest, fastest, dt)
+            check_step(scenario.irregularity, shortest, fastest, dt)
         except InputError:
             if wanted == "auto" and dt != AUTO_STEPS[-1]:
                 continue

@@ -1,1 +1,1 @@
-"""Figures of results: one kind a file, each a function from a result to a matplotlib figure."""
+"""Figures of results: one kind per file, each a function from a result to a matplotlib figure."""

@@ -1,4 +1,4 @@
-"""The kinds of figures: names, headings, and what to look for; a kind's module is imported when it is drawn."""
+"""Kinds of figures: names, headings and captions; a kind's module is imported only when it is drawn."""
 
 from __future__ import annotations
 
@@ -21,27 +21,25 @@ class Kind:
     """One kind of figure.
 
     Attributes:
-        name: On the command line; the module ``tiengine.figures.<name>`` draws it.
+        name: Name on the command line; the module ``tiengine.figures.<name>`` draws it.
         title: Heading in a report.
-        look_for: One sentence for the reader.
-        of_all: The figure shows all trains of a file, not one.
+        caption: One or two sentences that tell the reader how to judge the figure.
     """
 
     name: str
     title: str
-    look_for: str
-    of_all: bool = False
+    caption: str
 
     def draw(self, result: Result, *arguments: Any) -> Figure:
         """Draw the figure.
 
         Args:
             result: An open file.
-            arguments: Number of the train; before it, for ``compare``, the second file.
+            arguments: Number of the train; for ``compare`` preceded by the second file.
 
         Raises:
-            InputError: The file cannot give it; an ``AbsentError`` (:mod:`tiengine.indices.train_record`)
-                if it lacks a group.
+            InputError: The figure cannot be drawn from this file; an ``AbsentError``
+                (:mod:`tiengine.indices.train_record`) if the file lacks what it needs.
         """
         figure: Figure = import_module(f"tiengine.figures.{self.name}").draw(result, *arguments)
         return figure
@@ -51,63 +49,66 @@ KINDS = (
     Kind(
         "forces",
         "Wheel forces",
-        "Filtered forces of the leading wheelset should keep away from the dashed limits; where the grey band touches"
-        " zero a wheel has left the rail.",
+        "The filtered forces of the leading wheelset should stay well within the dashed limits; where the grey band"
+        " reaches zero, a wheel has lost contact with the rail.",
     ),
     Kind(
         "envelopes",
         "Fastenings and slabs",
-        "A failed fastening's load goes to its neighbours: read their ratio to a sound seat in the upper picture, and"
-        " see whether mortar pressure and bending moments rise at the same chainage.",
+        "Neighbouring fastenings take over the load of a failed one: the upper panel shows their load relative to a"
+        " sound seat; check whether mortar pressure and bending moments rise at the same chainage.",
     ),
     Kind(
         "waterfall",
         "Deflection around the train",
-        "Over sound track bands are straight and even; a weak place is a spot that the wheels meet one after the"
-        " other. Every row is a snapshot (more of them by output.deflection_interval); white specks are joints.",
+        "On sound track the bands are straight and uniform; a weak spot shows as a mark that the wheels reach one"
+        " after another. Each row is a snapshot (output.deflection_interval sets their spacing); white dots are joints"
+        " between slabs.",
     ),
     Kind(
         "spectrum",
         "Spectra",
-        "Peaks at the grey lines come from the track's own spacing or from the P2 resonance; what ends abruptly is the"
-        " irregularity at its shortest wave.",
+        "Peaks at the grey lines come from the spacing of seats, slabs and wheelsets or from the P2 resonance; an"
+        " abrupt end of a spectrum marks the shortest wavelength of the irregularity.",
     ),
     Kind(
         "contact",
         "Contact positions",
-        "Contact should stay on the tread; a second hump near the flange root (negative positions) is flange contact.",
+        "Contact should stay on the tread; a second peak near the flange root (negative positions) is flange contact.",
     ),
     Kind(
         "ride",
         "Ride",
-        "Accelerations that count for the ride, over either bogie; they should keep far from the dashed limit.",
+        "Floor accelerations over the bogies, filtered as the standards require; they should stay well within the"
+        " dashed limit.",
     ),
     Kind(
         "gauges",
         "Gauges",
-        "What an instrument at that place of the track would show; grey lines are the wheels that pass it.",
+        "Signals that an instrument at that place of the track would record; grey lines mark the passing wheelsets.",
     ),
     Kind(
         "ensemble",
         "All trains",
-        "The band holds nine trains out of ten; a place where all trains are high is one of the track, a single high"
-        " train is one of its irregularity.",
-        of_all=True,
+        "The band contains nine out of ten trains; where all trains show high values the track is the cause, where a"
+        " single train does it is its realisation of the irregularity.",
     ),
 )
-COMPARE = Kind("compare", "Two results", "Where the difference stands out, something besides the numerics differs.")
+COMPARE = Kind(
+    "compare", "Two results", "A difference well above the numerical error shows that more than the numerics differs."
+)
 
 
 def names() -> tuple[str, ...]:
-    """Names on the command line."""
+    """Names of all kinds, as on the command line."""
     return (*(kind.name for kind in KINDS), COMPARE.name)
 
 
 def kind_named(name: str) -> Kind:
-    """A kind by its name.
+    """Find a kind by its name.
 
     Raises:
-        InputError: There is none of that name.
+        InputError: There is no such kind.
     """
     for kind in (*KINDS, COMPARE):
         if kind.name == name:

@@ -1,4 +1,4 @@
-"""Two results over the same way: wheel forces laid over each other, and their difference."""
+"""Comparison of two results over the same chainages: wheel forces overlaid, and their difference."""
 
 from __future__ import annotations
 
@@ -23,74 +23,77 @@ if TYPE_CHECKING:
 __all__ = ["draw"]
 
 CHANNELS = {"vertical_force": "Vertical", "lateral_force": "Lateral"}
-LEAST_WAY = 1.0  # m that both must have run
-SAME_PLACE = 1e-3  # m
+LEAST_OVERLAP = 1.0  # m of chainage that both runs cover
+OFFSET_TOLERANCE = 1e-3  # m between wheelsets of the two trains
 
 
 @in_style
 def draw(result: Result, other: Result, train: int = 0) -> Figure:
-    """Forces of the leading left wheel in both files; the difference, of all wheels, second less first.
+    """Draw the forces of the leading left wheel in both files, and the difference (second minus first) of all wheels.
 
-    Equal chainages are compared. Where samples do not fall on the same places, those of the second file are
-    interpolated linearly.
+    Values are compared at equal chainages: those of the second file are interpolated linearly to the chainages of the
+    first.
 
     Args:
         result: The first file.
-        other: The second.
-        train: Number of the train, in both.
+        other: The second file.
+        train: Number of the train in both files.
 
     Raises:
-        InputError: The two have different wheelsets, no way in common, or one lacks the forces.
+        InputError: The trains have different wheelsets, the runs no chainages in common, or a file lacks the forces.
     """
     a, b = Train(result, train), Train(other, train)
     first, second = a.samples("wheel", *CHANNELS), b.samples("wheel", *CHANNELS)
-    begin, end, offset = _common(first, second, f"{result.name} and {other.name}")
+    begin, end, offset = _common_range(first, second, f"{result.name} and {other.name}")
     differences = {name: _Difference(begin, end, offset, bins_for(len(first))) for name in CHANNELS}
     for x, values, others in _side_by_side(first, second, begin, end):
         for name, difference in differences.items():
             difference.add(x, 1e-3 * values[name], 1e-3 * others[name])
     figure = new_figure(16.0, f"{a.caption} (a) and {b.caption} (b)")
     axes = figure.subplots(4, 1, sharex=True)
-    for (name, words), (above, below) in zip(CHANNELS.items(), (axes[:2], axes[2:]), strict=True):
+    for (name, title), (above, below) in zip(CHANNELS.items(), (axes[:2], axes[2:]), strict=True):
         differences[name].plot(above, below)
-        above.set_title(f"{words} force, leading left wheel")
+        above.set_title(f"{title} force, leading left wheel")
     axes[3].set_xlabel("chainage of the wheelset [m]")
     handles = [handle for panel in axes[:2] for handle in panel.get_legend_handles_labels()[0]]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
 
 
-def _common(first: Samples, second: Samples, where: str) -> tuple[float, float, Reals]:
-    """The way that both have run, of the first vehicle's centre [m], and the places of the wheelsets in the train."""
+def _common_range(first: Samples, second: Samples, names: str) -> tuple[float, float, Reals]:
+    """Chainages of the first vehicle's centre [m] between which both ran, and the wheelset offsets [m]."""
     offsets: list[Reals] = [samples.group["wheelset_offset"][:] for samples in (first, second)]
-    if offsets[0].shape != offsets[1].shape or np.abs(offsets[0] - offsets[1]).max() > SAME_PLACE:
+    if offsets[0].shape != offsets[1].shape or np.abs(offsets[0] - offsets[1]).max() > OFFSET_TOLERANCE:
         counts = " and ".join(str(len(each)) for each in offsets)
-        raise InputError(f"{where} cannot be compared: {counts} wheelsets, or not at the same places of the train")
-    begin, end = max(first.way[0], second.way[0]), min(first.way[1], second.way[1])
-    if end - begin < LEAST_WAY:
-        ways = " and ".join(f"{way[0]:.1f} to {way[1]:.1f} m" for way in (first.way, second.way))
-        raise InputError(f"{where} cannot be compared: chainages {ways} have no metre in common")
+        raise InputError(
+            f"{names} cannot be compared: {counts} wheelsets, or wheelsets at different places in the train"
+        )
+    ranges = first.chainage_range, second.chainage_range
+    begin, end = max(low for low, _ in ranges), min(high for _, high in ranges)
+    if end - begin < LEAST_OVERLAP:
+        both = " and ".join(f"{low:.1f} to {high:.1f} m" for low, high in ranges)
+        raise InputError(f"{names} cannot be compared: chainages {both} overlap by less than {LEAST_OVERLAP:g} m")
     return begin, end, offsets[0]
 
 
 def _side_by_side(
     first: Samples, second: Samples, begin: float, end: float
 ) -> Iterator[tuple[Reals, dict[str, Reals], dict[str, Reals]]]:
-    """Chainages [m] and channels of the first file, and of the second at the same chainages, piece after piece."""
+    """Yield chainages [m], channels of the first file, and those of the second at these chainages, slice by slice."""
     for x, a in first.slices(first.at(begin), first.at(end + 1e-9)):
         around = slice(max(second.at(float(x[0])) - 1, 0), min(second.at(float(x[-1])) + 1, len(second)))
-        there, b = second.read(around.start, around.stop)
-        yield x, a, {name: _at(x, there, values) for name, values in b.items()}
+        x_second, b = second.read(around.start, around.stop)
+        yield x, a, {name: _interpolated(x, x_second, values) for name, values in b.items()}
 
 
-def _at(x: Reals, there: Reals, values: Reals) -> Reals:
-    """Values (n, ...) at other places."""
-    columns = [np.interp(x, there, column) for column in values.reshape(len(there), -1).T]
+def _interpolated(x: Reals, known_x: Reals, values: Reals) -> Reals:
+    """Values of shape (len(known_x), ...) at the chainages x [m], by linear interpolation."""
+    columns = [np.interp(x, known_x, column) for column in values.reshape(len(known_x), -1).T]
     return np.stack(columns, axis=1).reshape(len(x), *values.shape[1:])
 
 
 class _Difference:
-    """One channel of two files [kN]."""
+    """Difference of one channel of two files [kN], gathered slice by slice."""
 
     def __init__(self, begin: float, end: float, offset: Reals, bins: int) -> None:
         self._offset = offset
@@ -102,7 +105,7 @@ class _Difference:
         self._squares, self._square_differences = np.zeros_like(self._sum), 0.0
 
     def add(self, x: Reals, a: Reals, b: Reals) -> None:
-        """Forces of both files at the same chainages, shape (n, wheelsets, 2)."""
+        """Add forces of both files [kN] at the chainages x [m], shape (n,); forces have shape (n, wheelsets, 2)."""
         difference = b - a
         for curve, values in zip(self._curves, (a, b, difference), strict=True):
             curve.add(x + self._offset[0], values[:, 0, 0])
@@ -116,8 +119,8 @@ class _Difference:
         self._square_differences += float((difference**2).sum())
 
     @property
-    def words(self) -> str:
-        """How far apart the two are, over all wheels."""
+    def summary(self) -> str:
+        """Largest and rms difference over all wheels, in words."""
         variance = float((self._squares / self._count - (self._sum / self._count) ** 2).mean())
         rms = float(np.sqrt(self._square_differences / self._count / self._sum.size))
         part = f" ({100.0 * self._largest / self._peak:.2g} % of a's largest)" if self._peak else ""
@@ -125,9 +128,9 @@ class _Difference:
         return f"largest {self._largest:.3g} kN{part}, rms {rms:.3g} kN{spread}"
 
     def plot(self, above: Axes, below: Axes) -> None:
-        """Both files above, the difference below."""
-        for curve, look, words in zip(self._curves, (LEFT, RIGHT), ("a", "b"), strict=False):
-            above.plot(*curve.line, label=words, rasterized=curve.is_thinned, **look._asdict())
+        """Draw both files into the upper panel, the difference into the lower one."""
+        for curve, look, label in zip(self._curves, (LEFT, RIGHT), ("a", "b"), strict=False):
+            above.plot(*curve.line, label=label, rasterized=curve.is_thinned, **look._asdict())
         band = self._band
         below.fill_between(
             band.x, band.low, band.high, color=GREY, linewidth=0.0, rasterized=True, label="b - a, all wheels"
@@ -136,7 +139,7 @@ class _Difference:
         below.plot(
             *line.line, color=BLACK, linewidth=0.7, rasterized=line.is_thinned, label="b - a, leading left wheel"
         )
-        below.set_title(f"b - a: {self.words}")
+        below.set_title(f"b - a: {self.summary}")
         for panel in (above, below):
             panel.margins(x=0.0)
             panel.set_ylabel("[kN]")

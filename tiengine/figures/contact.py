@@ -1,4 +1,4 @@
-"""Where wheels and rails touched: shares of time along the drawn profiles."""
+"""Contact positions on wheels and rails: shares of time along the profiles."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.figures.one_train import of_one_train
 from tiengine.figures.palette import BLACK
-from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure, plain
+from tiengine.figures.style import LEFT, RIGHT, new_figure, plain
 from tiengine.indices.train_record import AbsentError, Train
 from tiengine.parameters.arrays import Reals
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tiengine.contact.profile import Profile
-    from tiengine.result import Result
 
 __all__ = ["draw"]
 
@@ -25,23 +25,21 @@ BIN = 0.25e-3  # m along the profile
 MARGIN = 4e-3  # m beyond the outermost contact
 
 
-@in_style
-def draw(result: Result, train: int = 0) -> Figure:
-    """Histograms of the contact position of all left and all right wheels, above the profile they touch.
+@of_one_train
+def draw(train: Train) -> Figure:
+    """Draw histograms of the contact positions of all left and all right wheels above the profile they touch.
 
-    A time at which the wheel is off the rail does not count; the run-in does.
+    Samples at which a wheel is off the rail are left out; the run-in is included.
 
     Args:
-        result: An open file.
-        train: Number of the train.
+        train: The train.
 
     Raises:
-        InputError: No such train, no contact positions in the file, or no wheel that ever touched.
+        AbsentError: The file holds no contact positions, or all wheels of one side are off the rail throughout.
     """
-    source = Train(result, train)
     names = {"contact_position_wheel": "wheel", "contact_position_rail": "rail"}
-    samples = source.samples("wheel", "normal_force", *names)
-    parts, cant = source.scenario.parts, source.scenario.track.cant
+    samples = train.samples("wheel", "normal_force", *names)
+    parts, cant = train.scenario.parts, train.scenario.track.cant
     profiles = {"wheel": parts.wheel, "rail": parts.rail_profile.canted(cant)}
     counts = {name: _Histogram(profiles[body].span) for name, body in names.items()}
     for _, channels in samples.slices():
@@ -49,15 +47,17 @@ def draw(result: Result, train: int = 0) -> Figure:
         for name, histogram in counts.items():
             histogram.add(channels[name], touching)
     if not next(iter(counts.values())).total.all():
-        raise AbsentError(f"{result.name}: wheels of one side never touched the rail: no contact to draw")
-    figure = new_figure(15.0, f"{source.caption}: contact positions of all wheels, time in the air left out")
+        raise AbsentError(
+            f"{train.result.name}: the wheels of one side never touch the rail: there is no contact to draw"
+        )
+    figure = new_figure(15.0, f"{train.caption}: contact positions of all wheels while in contact")
     axes = figure.subplots(4, 1, height_ratios=(1.1, 1.0, 1.1, 1.0))
     for (name, body), (above, below) in zip(names.items(), (axes[:2], axes[2:]), strict=True):
         _histograms(above, counts[name])
         origin = "the tape circle" if body == "wheel" else "the crown"
         _profile(below, profiles[body], counts[name], f"outward from {origin} of the {body} [mm]")
         below.sharex(above)
-        above.set_xlim(*(1e3 * edge for edge in counts[name].window(profiles[body].span)))
+        above.set_xlim(*(1e3 * edge for edge in counts[name].shown(profiles[body].span)))
         above.set(
             title=plain(f"{body.capitalize()}: {profiles[body].name}"), ylabel=f"share of time\n[% in {1e3 * BIN:g} mm]"
         )
@@ -66,11 +66,11 @@ def draw(result: Result, train: int = 0) -> Figure:
 
 
 class _Histogram:
-    """Counts of positions along a profile, left and right.
+    """Histogram of contact positions along a profile, left and right.
 
     Attributes:
-        edges: Of the bins [m], shape (n + 1,).
-        counts: Shape (2, n).
+        edges: Edges of the bins [m], shape (n + 1,).
+        counts: Samples in each bin by side, shape (2, n).
     """
 
     def __init__(self, span: tuple[float, float]) -> None:
@@ -78,55 +78,55 @@ class _Histogram:
         self.counts: Reals = np.zeros((2, len(self.edges) - 1))
 
     def add(self, position: Reals, touching: NDArray[np.bool_]) -> None:
-        """Positions [m] that count where touching, shape (n, wheelsets, 2)."""
+        """Add positions [m] where ``touching`` holds; both have shape (n, wheelsets, 2)."""
         for side in range(2):
-            inside = position[..., side][touching[..., side]]
-            self.counts[side] += np.histogram(np.clip(inside, self.edges[0], self.edges[-1]), self.edges)[0]
+            in_contact = position[..., side][touching[..., side]]
+            self.counts[side] += np.histogram(np.clip(in_contact, self.edges[0], self.edges[-1]), self.edges)[0]
 
     @property
     def total(self) -> Reals:
-        """Samples of either side, shape (2,)."""
+        """Number of samples by side, shape (2,)."""
         return np.asarray(self.counts.sum(axis=1))
 
     @property
     def share(self) -> Reals:
-        """Share of the time in every bin [%], shape (2, n)."""
+        """Share of the contact time in every bin [%], shape (2, n)."""
         return 100.0 * self.counts / self.total[:, None]
 
     @property
     def touched(self) -> tuple[float, float]:
-        """From the first to the last bin that holds a sample [m]."""
+        """Limits of the bins that hold samples [m]."""
         filled = np.flatnonzero(self.counts.sum(axis=0))
         return float(self.edges[filled[0]]), float(self.edges[filled[-1] + 1])
 
-    def window(self, span: tuple[float, float]) -> tuple[float, float]:
-        """What is touched and a margin, within the profile [m]."""
+    def shown(self, span: tuple[float, float]) -> tuple[float, float]:
+        """Limits of the picture [m]: the touched part and a margin, within the profile."""
         low, high = self.touched
         return max(low - MARGIN, span[0]), min(high + MARGIN, span[1])
 
     def middle(self, side: int) -> float:
-        """Median position [m]."""
+        """Median position of one side [m]."""
         running = np.cumsum(self.counts[side]) / self.total[side]
         return float(self.edges[np.searchsorted(running, 0.5)] + 0.5 * BIN)
 
 
 def _histograms(axes: Axes, histogram: _Histogram) -> None:
-    for side, look, words in ((0, LEFT, "left wheels"), (1, RIGHT, "right wheels")):
-        axes.stairs(histogram.share[side], 1e3 * histogram.edges, label=words, linewidth=0.9,
+    for side, look, label in ((0, LEFT, "left wheels"), (1, RIGHT, "right wheels")):
+        axes.stairs(histogram.share[side], 1e3 * histogram.edges, label=label, linewidth=0.9,
                     edgecolor=look.color, linestyle=look.linestyle)  # fmt: skip
     axes.set_ylim(bottom=0.0)
 
 
-def _profile(axes: Axes, profile: Profile, histogram: _Histogram, words: str) -> None:
-    """The profile about where it was touched, the part that was touched bold, medians marked."""
+def _profile(axes: Axes, profile: Profile, histogram: _Histogram, abscissa: str) -> None:
+    """Draw the profile around its touched part, which is bold; triangles mark the medians."""
     low, high = histogram.touched
-    y = np.linspace(*histogram.window(profile.span), 800)
+    y = np.linspace(*histogram.shown(profile.span), 800)
     inside = (y >= low) & (y <= high)
     axes.plot(1e3 * y, 1e3 * profile.height(y), color=BLACK, linewidth=0.8)
     axes.plot(1e3 * y[inside], 1e3 * profile.height(y[inside]), color=BLACK, linewidth=2.2)
     for side, look, marker in ((0, LEFT, "v"), (1, RIGHT, "^")):
         middle = histogram.middle(side)
         axes.plot(1e3 * middle, 1e3 * float(profile.height(middle)), marker, color=look.color, markersize=6)
-    axes.set(xlabel=words, ylabel="down [mm],\nstretched")
+    axes.set(xlabel=abscissa, ylabel="down [mm],\nstretched")
     axes.margins(y=0.2)
     axes.invert_yaxis()

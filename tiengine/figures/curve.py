@@ -1,4 +1,4 @@
-"""Curves of any length in bounded memory: short ones as they are, long ones as least and largest value per pixel."""
+"""Curves of any length in bounded memory: short ones sample by sample, long ones as least and largest value per bin."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from tiengine.parameters.arrays import Reals
 __all__ = ["BINS", "Band", "Curve", "bins_for"]
 
 BINS = 1600
-"""Bins along a figure's width: a fifteenth of a millimetre each in print."""
+"""Bins along a figure's width, 0.1 mm each in print."""
 
 
 def bins_for(samples: int) -> int:
-    """Bins of a band over so many samples: half a figure's, and fewer where some would stay empty."""
+    """Number of bins for a band over a number of samples: half of ``BINS``, fewer where bins would stay empty."""
     return int(np.clip(samples // 4, 1, BINS // 2))
 
 
@@ -22,28 +22,28 @@ class Band:
 
     Attributes:
         x: Middle of each bin, shape (bins,).
-        low: Least value in it, NaN where there is none, shape (bins,).
-        high: Largest.
+        low: Least value in each bin, NaN where there is none, shape (bins,).
+        high: Largest value in each bin, likewise, shape (bins,).
     """
 
     def __init__(self, begin: float, end: float, bins: int = BINS) -> None:
-        """Divide an abscissa.
+        """Divide an abscissa into bins.
 
         Args:
-            begin: Where the first bin begins.
-            end: Where the last ends.
-            bins: How many.
+            begin: Lower edge of the first bin.
+            end: Upper edge of the last bin.
+            bins: Number of bins.
         """
         self._begin, self._width = begin, max(end - begin, 1e-12) / bins
         self.x: Reals = begin + self._width * (np.arange(bins, dtype=np.float64) + 0.5)
         self.low, self.high = np.full(bins, np.nan), np.full(bins, np.nan)
 
     def add(self, x: Reals, values: Reals) -> None:
-        """Take values into account.
+        """Add values.
 
         Args:
-            x: Where they are, not falling, shape (n,).
-            values: One or several at each place, shape (n,) or (n, k).
+            x: Abscissae, in ascending order, shape (n,).
+            values: One or several values at each abscissa, shape (n,) or (n, k).
         """
         if not len(x):
             return
@@ -57,20 +57,20 @@ class Band:
 
 
 class Curve:
-    """One curve, given piece by piece."""
+    """One curve, built up slice by slice."""
 
     def __init__(self, begin: float, end: float, bins: int = BINS) -> None:
-        """Prepare for an abscissa from ``begin`` to ``end``; beyond two samples a bin the curve is thinned."""
+        """Prepare for an abscissa from ``begin`` to ``end``; beyond two samples per bin the curve is thinned."""
         self._pieces: list[tuple[Reals, Reals]] = []
         self._count = 0
         self._band = Band(begin, end, bins)
 
     def add(self, x: Reals, y: Reals) -> None:
-        """Go on with samples.
+        """Append samples.
 
         Args:
-            x: Not falling, nor below what was added before, shape (n,).
-            y: Shape (n,).
+            x: Abscissae, in ascending order and not below those added before, shape (n,).
+            y: Ordinates, shape (n,).
         """
         self._count += len(x)
         self._pieces.append((x, y))
@@ -81,12 +81,12 @@ class Curve:
 
     @property
     def is_thinned(self) -> bool:
-        """Whether single samples are no longer kept."""
+        """Whether the curve holds extremes per bin instead of single samples."""
         return self._count > 2 * len(self._band.x)
 
     @property
     def line(self) -> tuple[Reals, Reals]:
-        """Abscissa and ordinate to draw: every sample, or the least and the largest of every bin in turn."""
+        """Abscissae and ordinates to draw: every sample, or the least and the largest value of each bin in turn."""
         if not self.is_thinned:
             pieces = self._pieces or [(np.empty(0), np.empty(0))]
             return np.concatenate([x for x, _ in pieces]), np.concatenate([y for _, y in pieces])

@@ -1,4 +1,4 @@
-"""Wheel forces over many trains: median and band of 5 to 95 % in every stretch of the way."""
+"""Wheel forces over many trains: median and band of 5 to 95 % in stretches of the chainage."""
 
 from __future__ import annotations
 
@@ -21,44 +21,44 @@ if TYPE_CHECKING:
 
 __all__ = ["draw"]
 
-STRETCH = 2.0  # m
-STRETCHES = 300  # at most
+STRETCH = 2.0  # m, length of a stretch
+MOST_STRETCHES = 300  # longer runs have longer stretches
 LEAST_TRAINS = 3
 
 
 @in_style
 def draw(result: Result, train: int | None = None) -> Figure:
-    """Largest and smallest Q and largest |Y| of the leading wheelset in every stretch of the way, over all trains.
+    """Draw extremes of Q and |Y| of the leading wheelset in stretches of the chainage, over all trains.
 
-    Trains that did not run to their end are left out.
+    Trains that did not complete their run are left out.
 
     Args:
         result: An open file.
-        train: Not used: the figure is one of all trains.
+        train: Not used: the figure shows all trains.
 
     Raises:
-        AbsentError: Fewer than three trains in the file that ran to their end, or no wheel forces.
+        AbsentError: Fewer than three trains completed their run, or the file holds no wheel forces.
     """
-    done = [i for i in range(result.trains) if result.status(i) == COMPLETE]
-    if len(done) < LEAST_TRAINS:
+    complete = [i for i in range(result.trains) if result.status(i) == COMPLETE]
+    if len(complete) < LEAST_TRAINS:
         raise AbsentError(
-            f"{result.name}: {len(done)} train(s) that ran to the end; bands over trains need {LEAST_TRAINS}: set"
+            f"{result.name}: {len(complete)} complete train(s); bands over trains need {LEAST_TRAINS}: set"
             " ensemble.size and run again"
         )
-    runs = [Train(result, i).samples("wheel", "vertical_force", "lateral_force") for i in done]
+    runs = [Train(result, i).samples("wheel", "vertical_force", "lateral_force") for i in complete]
     lead = float(runs[0].group["wheelset_offset"][0])
-    begin, end = (pick(run.way[i] for run in runs) + lead for i, pick in ((0, min), (1, max)))
-    bins = int(np.clip(np.ceil((end - begin) / STRETCH), 1, STRETCHES))
+    begin, end = (pick(run.chainage_range[i] for run in runs) + lead for i, pick in ((0, min), (1, max)))
+    bins = int(np.clip(np.ceil((end - begin) / STRETCH), 1, MOST_STRETCHES))
     extremes = np.stack([_extremes(run, begin, end, bins) for run in runs])
     x: Reals = begin + (end - begin) / bins * (np.arange(bins, dtype=np.float64) + 0.5)
     figure = new_figure(
-        15.0, f"{result.name.rpartition('/')[2]}: leading wheelset of {len(done)} trains, stretches of"
+        15.0, f"{result.name.rpartition('/')[2]}: leading wheelset of {len(complete)} trains, stretches of"
         f" {(end - begin) / bins:.3g} m"
     )  # fmt: skip
     axes = figure.subplots(3, 1, sharex=True)
     titles = ("Largest Q in the stretch", "Smallest Q in the stretch", "Largest |Y| in the stretch")
     for i, (panel, title) in enumerate(zip(axes, titles, strict=True)):
-        farthest = done[_plot(panel, x, extremes[:, i])]
+        farthest = complete[_plot(panel, x, extremes[:, i])]
         panel.set(title=f"{title}; farthest from the median: train {farthest}", ylabel="[kN]")
         panel.margins(x=0.0)
     axes[2].set_xlabel("chainage of the wheelset [m]")
@@ -67,7 +67,7 @@ def draw(result: Result, train: int | None = None) -> Figure:
 
 
 def _extremes(run: Samples, begin: float, end: float, bins: int) -> Reals:
-    """Largest Q, smallest Q, largest |Y| [kN], shape (3, bins); NaN where the train was not."""
+    """Largest Q, smallest Q and largest |Y| [kN], shape (3, bins); NaN in stretches that the train did not reach."""
     offset = float(run.group["wheelset_offset"][0])
     Q, Y = Band(begin, end, bins), Band(begin, end, bins)
     for position, channels in run.slices():
@@ -77,7 +77,7 @@ def _extremes(run: Samples, begin: float, end: float, bins: int) -> Reals:
 
 
 def _plot(axes: Axes, x: Reals, values: Reals) -> int:
-    """Values of shape (trains, bins); empty stretches stay empty. Which train is farthest from the median."""
+    """Draw values of shape (trains, bins); return the index of the train farthest from the median."""
     reached = ~np.isnan(values).all(axis=0)
     x, values = x[reached], values[:, reached]
     low, middle, high = np.nanpercentile(values, (5.0, 50.0, 95.0), axis=0)

@@ -1,4 +1,4 @@
-"""Extremes of every seat and slab over chainage, and what defects make of their neighbours."""
+"""Extremes of every seat and slab over the chainage, with the neighbours of defects enlarged."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 
 from tiengine.figures.curve import Curve
 from tiengine.figures.neighbours import draw_seats, draw_slabs
+from tiengine.figures.one_train import of_one_train
 from tiengine.figures.palette import BLACK, ORANGE, PURPLE
-from tiengine.figures.style import LEFT, RIGHT, Look, in_style, new_figure
+from tiengine.figures.style import LEFT, RIGHT, Look, new_figure
 from tiengine.indices.extremes import Extremes, read_extremes
 from tiengine.indices.train_record import AbsentError, Train
 from tiengine.parameters.conventions import SIDES
@@ -19,31 +20,29 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from tiengine.result import Result
-
 __all__ = ["draw"]
 
 KEY = "output.envelopes"
 LOOKS = (LEFT, RIGHT)
 
 
-@in_style
-def draw(result: Result, train: int = 0) -> Figure:
-    """Forces of the rail on the fastenings, and pressure and moments of the slabs; defects marked and enlarged.
+@of_one_train
+def draw(train: Train) -> Figure:
+    """Draw forces of the rail on the fastenings, mortar pressure and slab moments; defects are marked and enlarged.
 
     Args:
-        result: An open file.
-        train: Number of the train.
+        train: The train.
 
     Raises:
-        InputError: No such train, or no envelopes in the file.
+        AbsentError: The file holds no envelopes, or the train reached no seat.
     """
-    source = Train(result, train)
-    seats, slabs = read_extremes(source, "seats", KEY), read_extremes(source, "slabs", KEY)
+    seats, slabs = read_extremes(train, "seats", KEY), read_extremes(train, "slabs", KEY)
     if not seats.reached.any():
-        raise AbsentError(f"{result.name}: the train came to no seat: no envelopes to draw")
+        raise AbsentError(f"{train.result.name}: the train reached no seat: there are no envelopes to draw")
     enlarged = [(extremes, draw) for extremes, draw in ((seats, draw_seats), (slabs, draw_slabs)) if extremes.defects]
-    figure = new_figure(20.0 if enlarged else 15.0, f"{source.caption}: extremes of the whole run, every seat and slab")
+    figure = new_figure(
+        20.0 if enlarged else 15.0, f"{train.caption}: extremes of every seat and slab over the whole run"
+    )
     below: Figure | SubFigure = figure
     if enlarged:
         above, below = figure.subfigures(2, 1, height_ratios=(1.0, 2.4), squeeze=False)[:, 0]
@@ -62,21 +61,21 @@ def draw(result: Result, train: int = 0) -> Figure:
     return figure
 
 
-def _enlarge(place: SubFigure, enlarged: Sequence[tuple[Extremes, Callable[[Axes, Extremes], None]]]) -> None:
-    """Seats, slabs or both about their worst defect."""
+def _enlarge(figure: SubFigure, enlarged: Sequence[tuple[Extremes, Callable[[Axes, Extremes], None]]]) -> None:
+    """Draw the surroundings of the worst defect of seats, slabs or both."""
     widths = (2.2, 1.0)[: len(enlarged)]
-    panels = np.atleast_1d(place.subplots(1, len(enlarged), width_ratios=widths))
-    for panel, (extremes, draw_about) in zip(panels, enlarged, strict=True):
-        draw_about(panel, extremes)
-    place.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    panels = np.atleast_1d(figure.subplots(1, len(enlarged), width_ratios=widths))
+    for panel, (extremes, draw_defect) in zip(panels, enlarged, strict=True):
+        draw_defect(panel, extremes)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
 
 
-def _line(axes: Axes, extremes: Extremes, values: Any, look: Look, scale: float, **more: Any) -> None:
-    """One row of extremes over the chainage that the train came to."""
+def _line(axes: Axes, extremes: Extremes, values: Any, look: Look, scale: float, **style: Any) -> None:
+    """Draw one channel of the seats or slabs that the train reached, over the chainage."""
     x = extremes.chainage[extremes.reached]
     curve = Curve(float(x[0]), float(x[-1]))
     curve.add(x, scale * np.asarray(values, np.float64)[extremes.reached])
-    axes.plot(*curve.line, rasterized=curve.is_thinned, **look._asdict(), **more)
+    axes.plot(*curve.line, rasterized=curve.is_thinned, **look._asdict(), **style)
 
 
 def _vertical(axes: Axes, seats: Extremes) -> None:
@@ -85,20 +84,20 @@ def _vertical(axes: Axes, seats: Extremes) -> None:
         _line(axes, seats, seats["smallest_vertical_force"][:, side], look, 1e-3, linewidth=0.5)
     axes.axhline(1e-3 * seats.sound_median("largest_vertical_force"), color=BLACK, linewidth=0.7, linestyle=":",
                  label="median of sound seats")  # fmt: skip
-    axes.set(ylabel="[kN]", title="Fastenings: largest vertical force and, thin, smallest (below zero: uplift)")
+    axes.set(ylabel="[kN]", title="Fastenings: largest vertical force; thin lines: smallest (negative: uplift)")
 
 
 def _lateral(axes: Axes, seats: Extremes) -> None:
     for side, look in enumerate(LOOKS):
         for name in ("largest_lateral_force", "smallest_lateral_force"):
             _line(axes, seats, seats[name][:, side], look, 1e-3, linewidth=0.8 if name[0] == "l" else 0.5)
-    axes.set(ylabel="[kN]", title="Fastenings: largest lateral force to the right and, thin, to the left")
+    axes.set(ylabel="[kN]", title="Fastenings: largest lateral force to the right; thin lines: to the left")
 
 
 def _pressure(axes: Axes, slabs: Extremes) -> None:
     for name, look in (("largest_pressure", Look(BLACK, "-")), ("smallest_pressure", Look(BLACK, "--"))):
         _line(axes, slabs, slabs[name], look, 1e-3, drawstyle="steps-mid")
-    axes.set(ylabel="[kPa]", title="Mortar: largest pressure and, dashed, smallest, dead weight included")
+    axes.set(ylabel="[kPa]", title="Mortar: largest pressure; dashed: smallest; dead weight included")
 
 
 def _moments(axes: Axes, slabs: Extremes) -> None:
@@ -107,20 +106,20 @@ def _moments(axes: Axes, slabs: Extremes) -> None:
         _line(axes, slabs, slabs[f"largest_moment_{direction}"], look, 1e-3, drawstyle="steps-mid")
         dashed = look._replace(linestyle="--")
         _line(axes, slabs, slabs[f"smallest_moment_{direction}"], dashed, 1e-3, drawstyle="steps-mid")
-    title = "Slabs: largest and, dashed, smallest bending moment; grey along the track, black across"
+    title = "Slabs: largest bending moment; dashed: smallest; grey: along the track, black: across"
     axes.set(ylabel="[kN m/m]", title=title)
 
 
 def _mark(axes: Axes, seats: Extremes, slabs: Extremes) -> None:
-    """Defects, with a triangle that is seen in a long run, too; and where not every wheel has passed."""
-    for extremes, colour, hatch, words in (
+    """Mark defects, with a triangle that stays visible in long runs, and stretches that not all wheels passed."""
+    for extremes, colour, hatch, label in (
         (seats, ORANGE, "", "fastenings with a defect"),
         (slabs, PURPLE, "////", "slab over a void"),
     ):
         for row in extremes.defects:
             low, high = extremes.span(row)
-            axes.axvspan(low, high, color=colour, alpha=0.4, hatch=hatch, linewidth=0.0, zorder=0, label=words)
+            axes.axvspan(low, high, color=colour, alpha=0.4, hatch=hatch, linewidth=0.0, zorder=0, label=label)
             middle = 0.5 * (low + high)
             axes.plot(middle, 1.0, "v", color=colour, markersize=4, transform=axes.get_xaxis_transform(), clip_on=False)
-    for low, high in seats.half_passed:
+    for low, high in seats.partly_passed:
         axes.axvspan(low, high, color="0.94", linewidth=0.0, zorder=-1, label="not passed by all wheels")

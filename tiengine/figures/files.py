@@ -1,4 +1,4 @@
-"""Figures as files: where each goes, and what could not be drawn."""
+"""Figures as files: their paths, and the reasons for figures that cannot be drawn."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ __all__ = ["draw_all", "draw_one"]
 
 
 def draw_one(result: Result, kind: str, output: Path | None, train: int = 0, other: Result | None = None) -> Path:
-    """Draw one figure, replacing a file.
+    """Draw one figure into a file, which it replaces.
 
     Args:
         result: An open file.
         kind: Name of the figure.
-        output: File or existing folder; beside the result if None.
+        output: File or existing folder; the folder of the result if None.
         train: Number of the train.
-        other: The second file, of ``compare``.
+        other: The second result, for ``compare``.
 
     Returns:
-        The figure's path.
+        Path of the figure.
 
     Raises:
         InputError: The figure cannot be drawn or written.
     """
-    path = _place(result, kind, output)
+    path = _path(result, kind, output)
     check_suffix(path)
     check_output(path, force=True)
     if (kind == COMPARE.name) != (other is not None):
@@ -47,15 +47,15 @@ def draw_one(result: Result, kind: str, output: Path | None, train: int = 0, oth
 
 
 def draw_all(result: Result, output: Path | None, train: int = 0) -> Iterator[tuple[str, str]]:
-    """Draw every figure that the file can give, replacing files.
+    """Draw every figure that the file has the data for, replacing existing files.
 
     Args:
         result: An open file.
-        output: An existing folder; beside the result if None.
+        output: An existing folder; that of the result if None.
         train: Number of the train.
 
     Yields:
-        Kind, and its path or why it was skipped.
+        Name of the kind, and its path or the reason why it is skipped.
 
     Raises:
         InputError: A figure cannot be written, or there is no such train or folder.
@@ -69,7 +69,7 @@ def draw_all(result: Result, output: Path | None, train: int = 0) -> Iterator[tu
             yield kind.name, f"skipped: {error}"
 
 
-def _place(result: Result, kind: str, output: Path | None) -> Path:
+def _path(result: Result, kind: str, output: Path | None) -> Path:
     """Path of a figure."""
     if output is not None and not output.is_dir():
         return output

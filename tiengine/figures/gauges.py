@@ -1,4 +1,4 @@
-"""Time histories of the gauges: what a place of rail, slab or fastening does as the train passes."""
+"""Time histories of the gauges: motion or force at a place of rail, slab or fastening as the train passes."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from tiengine.figures.curve import Curve
+from tiengine.figures.one_train import of_one_train
 from tiengine.figures.palette import BLUE, VERMILION
-from tiengine.figures.style import Look, in_style, new_figure, plain
+from tiengine.figures.style import Look, new_figure, plain
 from tiengine.indices.train_record import AbsentError, Train
 from tiengine.parameters.arrays import Reals
 
@@ -18,42 +19,38 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.result import Result
-
 __all__ = ["draw"]
 
-MOST = 8  # gauges a figure
+MOST = 8  # gauges in a figure
 LATERAL, VERTICAL = Look(VERMILION, "--"), Look(BLUE, "-")
 MOTIONS = {"displacement": (1e3, "[mm]"), "velocity": (1e3, "[mm/s]"), "acceleration": (1.0, "[m/s²]")}
 FORCES = {"vertical_force": (1e-3, "[kN]", VERTICAL), "lateral_force": (1e-3, "[kN]", LATERAL)}
 
 
-@in_style
-def draw(result: Result, train: int = 0) -> Figure:
-    """A row a gauge: motion of rail or slab, or forces of a fastening, over time; wheels that pass in grey.
+@of_one_train
+def draw(train: Train) -> Figure:
+    """Draw one row per gauge: motion of rail or slab, or forces of a fastening, over time; passing wheelsets in grey.
 
     Args:
-        result: An open file.
-        train: Number of the train.
+        train: The train.
 
     Raises:
-        InputError: No such train, or no gauge in the file that the train came to.
+        AbsentError: The file holds no gauges, or the train reached none of them.
     """
-    source = Train(result, train)
-    every = source.group("gauges", "[[gauges]]")
-    gauges = {name: group for name, group in every.items() if len(group["time"]) > 1}
+    all_gauges = train.group("gauges", "[[gauges]]")
+    gauges = {name: group for name, group in all_gauges.items() if len(group["time"]) > 1}
     if not gauges:
-        raise AbsentError(f"{result.name}: the train came to none of its gauges: {', '.join(every)}")
+        raise AbsentError(f"{train.result.name}: the train reached none of its gauges: {', '.join(all_gauges)}")
     shown = list(gauges.items())[:MOST]
-    more = f", {MOST} of {len(gauges)} gauges" if len(gauges) > MOST else ""
-    figure = new_figure(1.5 + 4.2 * len(shown), f"{source.caption}: gauges{more}; wheels that pass in grey")
+    selection = f", {MOST} of {len(gauges)} gauges" if len(gauges) > MOST else ""
+    figure = new_figure(1.5 + 4.2 * len(shown), f"{train.caption}: gauges{selection}; passing wheelsets in grey")
     rows = figure.subfigures(len(shown), 1, squeeze=False)[:, 0]
     for row, (name, group) in zip(rows, shown, strict=True):
         row.suptitle(plain(_title(name, group)), x=0.01, ha="left", fontsize=8.0)
         axes = row.subplots(1, 3 if "displacement" in group else 2)
         _history(axes, group)
         for panel in axes:
-            for passing in _passings(group, source.scenario.parts.wheelset_positions):
+            for passing in _passings(group, train.scenario.parts.wheelset_positions):
                 panel.axvline(passing, color="0.75", linewidth=0.6, zorder=0)
             panel.margins(x=0.0)
             panel.set_xlabel("time [s]")
@@ -91,7 +88,7 @@ def _plot(axes: Axes, group: Any, values: Reals, look: Look) -> None:
 
 
 def _passings(group: Any, wheelsets: Reals) -> Reals:
-    """Times at which wheelsets stand over the gauge [s]."""
+    """Times at which wheelsets are over the gauge [s], shape (passings,)."""
     position = group["position"][:]
     centre = float(group.attrs["chainage"]) - wheelsets
     centre = centre[(centre > position[0]) & (centre < position[-1])]

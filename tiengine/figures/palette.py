@@ -1,4 +1,4 @@
-"""Colours of Okabe and Ito, which the colour-blind tell apart."""
+"""Colours of Okabe and Ito, distinguishable with colour vision deficiency."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Power spectral densities of wheel forces and accelerations, with the frequencies that a track imposes.
+"""Power spectral densities of wheel forces and accelerations, with the frequencies that spacings impose.
 
-What is passed every d excites at V/d: seats, slabs, and seen from the rail, wheelsets of a bogie, bogies, vehicles.
-P2: :mod:`tiengine.indices.p2_resonance`.
+Anything spaced by d excites at the passing frequency V/d: seats, slabs and, seen from the rail, the wheelsets of a
+bogie, bogies and vehicles. P2 is the resonance of :mod:`tiengine.indices.p2_resonance`.
 """
 
 from __future__ import annotations
@@ -12,69 +12,67 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import signal
 
+from tiengine.figures.one_train import of_one_train
 from tiengine.figures.palette import BLACK, BLUE, GREEN, ORANGE
-from tiengine.figures.style import LEFT, RIGHT, Look, in_style, new_figure, plain
+from tiengine.figures.style import LEFT, RIGHT, Look, new_figure, plain
 from tiengine.indices.p2_resonance import p2_of
 from tiengine.indices.train_record import SLICE, AbsentError, Samples, Train
 from tiengine.parameters.arrays import Reals
 from tiengine.scenario.contact_settings import contact_settings
+from tiengine.vehicle.running_gear import cars, running_gears
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.result import Result
-
 __all__ = ["draw", "passing_frequencies", "welch"]
 
-LONGEST_SEGMENT = 1.0  # s, 1 Hz
-SEGMENTS_END_TO_END = 4  # at least: seven with their overlaps
+LONGEST_SEGMENT = 1.0  # s: resolution of 1 Hz
+LEAST_SEGMENTS = 4  # end to end; seven with their overlaps
 LEAST_DURATION = 0.4  # s
 HIGHEST = 1000.0  # Hz
 Y, Z = 0, 1
 
 
-@in_style
-def draw(result: Result, train: int = 0) -> Figure:
-    """Densities of Q and Y, mean over all wheels, and of the accelerations of the leading vehicle's bodies.
+@of_one_train
+def draw(train: Train) -> Figure:
+    """Draw densities of Q and Y, mean over all wheels, and of the accelerations of the leading vehicle's bodies.
 
     Args:
-        result: An open file.
-        train: Number of the train.
+        train: The train.
 
     Raises:
-        InputError: No such train, no wheel forces in the file, or too short a run behind the run-in.
+        AbsentError: The file holds no wheel forces, or the run after the run-in is too short.
     """
-    source = Train(result, train)
-    wheels = source.samples("wheel", "vertical_force", "lateral_force")
-    segment = _segment(source, wheels)
-    figure = new_figure(14.0, f"{source.caption}: Welch's method, Hann windows of {segment:.3g} s, run-in left out")
+    wheels = train.samples("wheel", "vertical_force", "lateral_force")
+    segment = _segment(train, wheels)
+    figure = new_figure(14.0, f"{train.caption}: Welch's method, Hann windows of {segment:.3g} s, run-in left out")
     above, below = figure.subplots(2, 1, sharex=True)
-    frequency, densities = welch(wheels, wheels.after(source.scenario.output.run_in), segment)
-    for look, name, words in ((LEFT, "vertical_force", "vertical, Q"), (RIGHT, "lateral_force", "lateral, Y")):
-        _plot(above, frequency, densities[name].mean(axis=(1, 2)), look, words)
+    frequency, densities = welch(wheels, wheels.after(train.scenario.output.run_in), segment)
+    for look, name, label in ((LEFT, "vertical_force", "vertical, Q"), (RIGHT, "lateral_force", "lateral, Y")):
+        _plot(above, frequency, densities[name].mean(axis=(1, 2)), look, label)
     above.set(ylabel="density [N²/Hz]", title="Wheel forces, mean over all wheels")
-    _accelerations(below, source, segment)
+    _accelerations(below, train, segment)
     top = min(HIGHEST, 0.5 / wheels.interval)
     above.set_xlim(1.0 / segment, top)
     largest = max(above.dataLim.y1, 1e-30)
-    above.set_ylim(1e-12 * largest, 3.0 * largest)  # room for the words
+    above.set_ylim(1e-12 * largest, 3.0 * largest)  # room for the labels
     below.set_xlabel("frequency [Hz]")
     below.xaxis.set_major_formatter("{x:g}")
-    marks = passing_frequencies(source)
+    marks = passing_frequencies(train)
     for panel in (above, below):
-        _mark(panel, marks, words=panel is above, limits=(1.0 / segment, top))
+        _mark(panel, marks, labelled=panel is above, limits=(1.0 / segment, top))
         if panel.get_legend_handles_labels()[0]:
             panel.legend(loc="upper right" if panel is above else "lower left")
     return figure
 
 
 def welch(samples: Samples, begin: int, segment: float) -> tuple[Reals, dict[str, Reals]]:
-    """One-sided densities by Welch's method, Hann windows half overlapping, slice by slice.
+    """Estimate one-sided densities by Welch's method, with Hann windows that overlap by half, slice by slice.
 
     Args:
-        samples: Channels.
-        begin: First sample that counts.
+        samples: The channels.
+        begin: Index of the first sample used.
         segment: Length of a window [s].
 
     Returns:
@@ -96,92 +94,91 @@ def welch(samples: Samples, begin: int, segment: float) -> tuple[Reals, dict[str
     return frequency, total
 
 
-def passing_frequencies(source: Train) -> dict[str, tuple[float, float]]:
-    """Lowest and highest frequency [Hz] of what passes, and P2, by name.
+def passing_frequencies(train: Train) -> dict[str, tuple[float, float]]:
+    """Compute lowest and highest passing frequencies, and P2 [Hz], by name.
 
     Args:
-        source: The train; its scenario gives all distances.
+        train: The train; its scenario gives all spacings and speeds.
     """
-    scenario, parts = source.scenario, source.scenario.parts
-    axles = parts.vehicles[0].axle_positions
-    half = (len(axles) + 1) // 2
+    scenario, parts = train.scenario, train.scenario.parts
+    axles, gears = parts.vehicles[0].axle_positions, running_gears(parts.vehicles[0])
     distances = {"seats": parts.slab.fastening_pitch, "slabs": parts.slab.pitch}
-    if len(axles) > 2:
+    if len(axles) > 1:
         distances["wheelsets"] = float(axles[0] - axles[1])
-        distances["bogies"] = float(axles[:half].mean() - axles[half:].mean())
-    elif len(axles) == 2:
-        distances["wheelsets"] = float(axles[0] - axles[1])
+    if 1 < len(gears) < len(axles):
+        distances["bogies"] = gears[0].centre - gears[1].centre
     if len(parts.vehicles) > 1:
         distances["vehicles"] = float(parts.centres[0] - parts.centres[1])
     first, last = scenario.rear + scenario.centre_in_window, scenario.train.distance
     speeds = [scenario.train.speed.at(x)[0] for x in np.linspace(first, first + last, 50)]
     found = {name: (min(speeds) / d, max(speeds) / d) for name, d in distances.items()}
     found["2 x seats"] = tuple(2.0 * f for f in found["seats"])  # type: ignore[assignment]
-    p2 = p2_of(parts, contact_settings(scenario, source.model))
+    p2 = p2_of(parts, contact_settings(scenario, train.model))
     return {**found, "P2": (p2, p2)}
 
 
-def _segment(source: Train, samples: Samples) -> float:
-    """Length of a window [s]."""
-    count = len(samples) - samples.after(source.scenario.output.run_in)
+def _segment(train: Train, samples: Samples) -> float:
+    """Length of a Hann window [s]."""
+    count = len(samples) - samples.after(train.scenario.output.run_in)
     duration = count * samples.interval
     if duration < LEAST_DURATION:
         raise AbsentError(
-            f"{source.result.name}: {duration:.3g} s behind the run-in are too short for a spectrum, {LEAST_DURATION} s"
+            f"{train.result.name}: {duration:.3g} s after the run-in are too short for a spectrum, {LEAST_DURATION} s"
             " are needed; set a longer train.distance or a shorter output.run_in and run again"
         )
-    return min(LONGEST_SEGMENT, duration / SEGMENTS_END_TO_END)
+    return min(LONGEST_SEGMENT, duration / LEAST_SEGMENTS)
 
 
-def _accelerations(axes: Axes, source: Train, segment: float) -> None:
-    """Car, frames and wheelsets of the leading vehicle; a sentence where the file has no accelerations."""
+def _accelerations(axes: Axes, train: Train, segment: float) -> None:
+    """Draw car, frames and wheelsets of the leading vehicle, or the reason why there are no accelerations."""
     axes.set(ylabel="density [(m/s²)²/Hz]", title="Accelerations, leading vehicle")
     try:
-        bodies = source.samples("body", "acceleration")
+        bodies = train.samples("body", "acceleration")
     except AbsentError as absent:
         axes.text(0.5, 0.5, plain(str(absent)), transform=axes.transAxes, ha="center", va="center", wrap=True)
         return
-    frequency, densities = welch(bodies, bodies.after(source.scenario.output.run_in), segment)
+    frequency, densities = welch(bodies, bodies.after(train.scenario.output.run_in), segment)
     S = densities["acceleration"]
-    car, frames, wheelsets = _bodies(source, list(bodies.group["body"].asstr()[:]))
+    car_rows, frames, wheelsets = _bodies(train, list(bodies.group["body"].asstr()[:]))
     looks = {
-        "car, vertical": (Look(BLUE, "-"), car, Z),
-        "car, lateral": (Look(ORANGE, "--"), car, Y),
+        "car, vertical": (Look(BLUE, "-"), car_rows, Z),
+        "car, lateral": (Look(ORANGE, "--"), car_rows, Y),
         "bogie frames, vertical": (Look(GREEN, "-."), frames, Z),
         "wheelsets, vertical": (Look(BLACK, ":"), wheelsets, Z),
     }
-    for words, (look, rows, motion) in looks.items():
+    for label, (look, rows, motion) in looks.items():
         if rows:
-            _plot(axes, frequency, S[:, rows, motion].mean(axis=1), look, words)
+            _plot(axes, frequency, S[:, rows, motion].mean(axis=1), look, label)
 
 
-def _bodies(source: Train, names: Sequence[str]) -> tuple[list[int], list[int], list[int]]:
-    """Rows of car, frames and wheelsets of the leading vehicle."""
-    vehicles = source.scenario.parts.vehicles
+def _bodies(train: Train, names: Sequence[str]) -> tuple[list[int], list[int], list[int]]:
+    """Rows of the leading vehicle's cars, other suspended bodies and wheelsets among the recorded bodies."""
+    vehicles = train.scenario.parts.vehicles
     prefix = "v1 " if len(vehicles) > 1 else ""
-    loose = [body for body in vehicles[0].body if not body.wheelset]
-    car = max(loose, key=lambda body: body.mass, default=None)
+    suspended = [body.name for body in vehicles[0].body if not body.wheelset]
+    car_names = [car.body.name for car in cars(vehicles[0])]
     axles = len(vehicles[0].axle_positions)
     wanted = (
-        [f"{prefix}{car.name}"] if car else [],
-        [f"{prefix}{body.name}" for body in loose if body is not car],
+        [f"{prefix}{name}" for name in car_names],
+        [f"{prefix}{name}" for name in suspended if name not in car_names],
         [f"wheelset {i + 1}" for i in range(axles)],
     )
     return tuple([names.index(name) for name in group if name in names] for group in wanted)  # type: ignore[return-value]
 
 
-def _plot(axes: Axes, frequency: Reals, density: Reals, look: Look, words: str) -> None:
-    """Without the mean at 0 Hz; a body at rest, all zero, has no place on a logarithmic axis."""
+def _plot(axes: Axes, frequency: Reals, density: Reals, look: Look, label: str) -> None:
+    """Draw a density without its value at 0 Hz, unless it is all zero, which a logarithmic axis cannot show."""
     if density[1:].any():
-        axes.loglog(frequency[1:], density[1:], label=words, **look._asdict())
+        axes.loglog(frequency[1:], density[1:], label=label, **look._asdict())
 
 
-def _mark(axes: Axes, marks: dict[str, tuple[float, float]], *, words: bool, limits: tuple[float, float]) -> None:
+def _mark(axes: Axes, marks: dict[str, tuple[float, float]], *, labelled: bool, limits: tuple[float, float]) -> None:
+    """Shade passing frequencies within the limits [Hz]."""
     for name, (low, high) in marks.items():
         if not limits[0] < low <= high < limits[1]:
             continue
         axes.axvspan(low, high, color="0.5", linewidth=0.8, alpha=0.6, zorder=0)
-        if words:
+        if labelled:
             axes.annotate(
                 f"{name} {low:.3g}{f' to {high:.3g}' if high > 1.001 * low else ''} Hz",
                 (low, 0.0),

@@ -1,7 +1,7 @@
-"""How figures look: as wide as a text column, 8 pt, for print, for grey and for colour-blind eyes.
+"""Style of the figures: width of a text column, 8 pt, readable in print, in grey and with colour vision deficiency.
 
-Figures are made with matplotlib's objects alone: no display, no state of pyplot. Names from users' files go through
-:func:`plain`, since matplotlib takes what stands between dollar signs for a formula.
+Figures use matplotlib's objects only, without a display and without pyplot's global state. Names from users' files pass
+through :func:`plain`, since matplotlib reads text between dollar signs as a formula.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ P = ParamSpec("P")
 
 WIDTH = 16.0  # cm, a text column of A4
 CENTIMETRE = 1.0 / 2.54  # inches
-DPI = 200  # of pictures made of points
+DPI = 200  # of raster images
 
-RULES: Any = {
+STYLE: Any = {
     "font.size": 8.0,
     "axes.titlesize": 8.0,
     "axes.titlelocation": "left",
@@ -54,7 +54,7 @@ RULES: Any = {
 
 
 class Look(NamedTuple):
-    """Colour and dashes of a line; either alone tells lines apart."""
+    """Colour and dashes of a line; lines differ in both."""
 
     color: str
     linestyle: str
@@ -65,22 +65,22 @@ LEFT, RIGHT = Look(BLUE, "-"), Look(VERMILION, "--")
 
 
 def in_style(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Draw with the rules of this module, whatever the user's settings of matplotlib."""
+    """Make a drawing function use the style of this module, whatever the user's settings of matplotlib."""
 
     @wraps(draw)
     def styled(*arguments: P.args, **named: P.kwargs) -> Figure:
-        with rc_context(RULES):
+        with rc_context(STYLE):
             return draw(*arguments, **named)
 
     return styled
 
 
 def new_figure(height: float, caption: str = "") -> Figure:
-    """An empty figure of the house's width.
+    """Create an empty figure of the standard width.
 
     Args:
-        height: [cm].
-        caption: Where the numbers come from, small, above the figure.
+        height: Height [cm].
+        caption: Small text above the figure that says where the numbers come from.
     """
     figure = Figure(figsize=(WIDTH * CENTIMETRE, height * CENTIMETRE), layout="constrained")
     FigureCanvasAgg(figure)
@@ -90,23 +90,23 @@ def new_figure(height: float, caption: str = "") -> Figure:
 
 
 def plain(text: str) -> str:
-    """A text that is no formula."""
+    """Escape dollar signs, so that matplotlib prints the text as it is."""
     return text.replace("$", r"\$")
 
 
-def limit_line(axes: Axes, value: float, words: str, *, below: bool = False, left: bool = False) -> None:
-    """A horizontal line with its meaning at one end.
+def limit_line(axes: Axes, value: float, label: str, *, below: bool = False, left: bool = False) -> None:
+    """Draw a horizontal line with a label at one end.
 
     Args:
-        axes: Where.
-        value: In the unit of the axis.
-        words: What the line means.
-        below: Write below the line instead of above it.
-        left: Write at the left end instead of the right one.
+        axes: Axes to draw into.
+        value: Ordinate [unit of the axis].
+        label: Meaning of the line.
+        below: Put the label below the line instead of above it.
+        left: Put the label at the left end instead of the right one.
     """
     axes.axhline(value, color=BLACK, linewidth=0.8, linestyle=(0, (6, 2)))
     axes.annotate(
-        words,
+        label,
         (0.0 if left else 1.0, value),
         (2 if left else -2, -2 if below else 2),
         xycoords=("axes fraction", "data"),
@@ -119,10 +119,10 @@ def limit_line(axes: Axes, value: float, words: str, *, below: bool = False, lef
 
 
 def check_suffix(path: Path) -> None:
-    """Refuse a path whose suffix is no format of figures.
+    """Refuse a path whose suffix is not a figure format.
 
     Raises:
-        InputError: Names the suffixes.
+        InputError: The suffix is unknown; the message lists the known ones.
     """
     known = FigureCanvasAgg.get_supported_filetypes()
     if path.suffix.lower().lstrip(".") not in known:
@@ -130,14 +130,14 @@ def check_suffix(path: Path) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure, replacing a file.
+    """Write a figure to a file, which it replaces.
 
     Args:
-        figure: What to write.
-        path: Where; the suffix tells the format.
+        figure: The figure.
+        path: Path of the file; the suffix selects the format.
 
     Raises:
-        InputError: A suffix that is no format of figures, or a file that cannot be written.
+        InputError: The suffix is not a figure format, or the file cannot be written.
     """
     check_suffix(path)
     try:
@@ -148,7 +148,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def png(figure: Figure) -> bytes:
-    """A figure as the bytes of a PNG file."""
+    """Render a figure as the bytes of a PNG file."""
     memory = io.BytesIO()
     with _quiet():
         figure.savefig(memory, dpi=DPI, format="png")
@@ -157,7 +157,7 @@ def png(figure: Figure) -> bytes:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """The house's rules; letters that the font lacks, as in a name in Chinese, become boxes without a warning."""
-    with rc_context(RULES), warnings.catch_warnings():
+    """Apply the style; letters that the font lacks, as in a Chinese name, become boxes without a warning."""
+    with rc_context(STYLE), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield

@@ -1,4 +1,4 @@
-"""Deflection of rails and slabs around the train while it moves on."""
+"""Deflection of rails and slabs around the moving train."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.colors import Normalize
 
+from tiengine.figures.one_train import of_one_train
 from tiengine.figures.palette import BLACK, SKY
-from tiengine.figures.style import LEFT, RIGHT, in_style, new_figure
+from tiengine.figures.style import LEFT, RIGHT, new_figure
 from tiengine.indices.train_record import AbsentError, Train
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.conventions import SIDES
@@ -17,36 +18,32 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiengine.result import Result
-
 __all__ = ["draw", "largest_by_stretch"]
 
-ROWS = 400  # a picture's, at most
+MOST_ROWS = 400  # of a picture
 SLICE = 200  # snapshots in memory at a time
-COLOURS = "cividis"  # one ramp of lightness: reads in grey and for all eyes
+COLOURS = "cividis"  # monotonic lightness: readable in grey and with colour vision deficiency
 
 
-@in_style
-def draw(result: Result, train: int = 0) -> Figure:
-    """Profiles of rail and slab around the train, and pictures of them over the train's way.
+@of_one_train
+def draw(train: Train) -> Figure:
+    """Draw the deflection of rail and slab around the train, and pictures of it over the train's chainage.
 
     Args:
-        result: An open file.
-        train: Number of the train.
+        train: The train.
 
     Raises:
-        InputError: No such train, or no snapshots of the deflection in the file.
+        AbsentError: The file holds fewer than two snapshots of the deflection.
     """
-    source = Train(result, train)
-    group = source.group("deflection", "output.deflection_interval")
+    group = train.group("deflection", "output.deflection_interval")
     if len(group["position"]) < 2:
         raise AbsentError(
-            f"{result.name}: {len(group['position'])} snapshot(s) of the deflection; set a shorter"
+            f"{train.result.name}: {len(group['position'])} snapshot(s) of the deflection; set a shorter"
             " output.deflection_interval and run again"
         )
     offset: Reals = group["offset"][:]
-    wheels = source.scenario.parts.wheelset_positions
-    figure = new_figure(19.0, f"{source.caption}: deflection around the train, down positive")
+    wheels = train.scenario.parts.wheelset_positions
+    figure = new_figure(19.0, f"{train.caption}: deflection around the train, down positive")
     axes = figure.subplots(3, 2, sharex=True, height_ratios=(0.75, 1.0, 1.0))
     for body, row in (("rail", 1), ("slab", 2)):
         edges, values = largest_by_stretch(group, body)
@@ -72,16 +69,16 @@ def draw(result: Result, train: int = 0) -> Figure:
     return figure
 
 
-def largest_by_stretch(group: Any, body: str, rows: int = ROWS) -> tuple[Reals, Reals]:
-    """Snapshots, or where they are more than a picture has rows, the largest of each stretch of the way.
+def largest_by_stretch(group: Any, body: str, rows: int = MOST_ROWS) -> tuple[Reals, Reals]:
+    """Reduce snapshots to the rows of a picture: the largest deflection in each stretch of the train's chainage.
 
     Args:
         group: ``deflection`` of a train.
         body: ``"rail"`` or ``"slab"``.
-        rows: Of the picture, at most.
+        rows: Number of rows, at most; fewer snapshots are returned as they are.
 
     Returns:
-        Edges of the rows [m], shape (n + 1,), and deflection [m], shape (n, 2, points), NaN over joints.
+        Edges of the rows [m], shape (n + 1,), and deflections [m], shape (n, 2, points), NaN over joints of slabs.
     """
     position: Reals = group["position"][:]
     count = len(position)
@@ -96,7 +93,7 @@ def largest_by_stretch(group: Any, body: str, rows: int = ROWS) -> tuple[Reals, 
 
 
 def _picture(axes: Axes, offset: Reals, edges: Reals, values: Reals, scale: Normalize) -> Any:
-    """Rows of one side, shape (n, points)."""
+    """Draw rows of one side [mm], shape (n, points)."""
     middle = 0.5 * (offset[1:] + offset[:-1])
     columns = np.concatenate([offset[:1], middle, offset[-1:]])
     axes.grid(visible=False)
@@ -104,8 +101,9 @@ def _picture(axes: Axes, offset: Reals, edges: Reals, values: Reals, scale: Norm
 
 
 def _profile(axes: Axes, offset: Reals, values: Reals, body: str) -> None:
-    seen = ~np.isnan(values).all(axis=0)
-    low, median, high = np.nanpercentile(values[:, seen], (5.0, 50.0, 95.0), axis=0)
+    """Draw median and band of rows of one side [mm], shape (n, points)."""
+    defined = ~np.isnan(values).all(axis=0)
+    low, median, high = np.nanpercentile(values[:, defined], (5.0, 50.0, 95.0), axis=0)
     look = LEFT if body == "rail" else RIGHT
-    axes.fill_between(offset[seen], low, high, color=SKY if body == "rail" else "0.8", alpha=0.6, linewidth=0.0)
-    axes.plot(offset[seen], median, label=body, **look._asdict())
+    axes.fill_between(offset[defined], low, high, color=SKY if body == "rail" else "0.8", alpha=0.6, linewidth=0.0)
+    axes.plot(offset[defined], median, label=body, **look._asdict())

@@ -1,12 +1,15 @@
 """EN 14363, running behaviour of a vehicle on straight track (zone 1), normal method.
 
-Quantities: the quotient Y/Q and the wheelset's force sum Y, low pass of 20 Hz, means over 2 m every 0.5 m; the wheel
-force Q, low pass of 20 Hz; accelerations of floor points over the bogies, 0.4 to 10 Hz. Of each series the percentiles
-0.15 and 99.85 count, the greater in magnitude (of Q the upper).
+Quantities: the quotient Y/Q and the sum of the lateral forces Y of a wheelset, low pass of 20 Hz, means over 2 m every
+0.5 m; the wheel force Q, low pass of 20 Hz; accelerations of floor points over the bogies, 0.4 to 10 Hz. The value of a
+series is the greater in magnitude of its percentiles 0.15 and 99.85, for Q the upper one.
 
-A zone has sections of 250 m, above 220 km/h 500 m, 25 at least and 10 km together. With these the estimated maximum
-is mean + k standard deviation of the sections' values, k = 3.0 for running safety and 2.2 else: an assessment of the
-zone. On less way the percentiles are those of the whole: an index.
+A zone has sections of 250 m, above 220 km/h of 500 m, at least 25 of them and 10 km in total. Then the estimated
+maximum is mean + k standard deviation of the sections' values, k = 3.0 for running safety and 2.2 otherwise: an
+assessment. Over a shorter distance the percentiles are taken over the whole run: an index.
+
+Limits of Y/Q and Q hold for all vehicles, others only for the classes that :data:`AXLE_FACTORS` and
+:data:`ACCELERATION_LIMITS` list; a value without a limit for its class is given without one.
 """
 
 from __future__ import annotations
@@ -16,12 +19,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tiengine.indices.filters import band_pass, sliding_mean
-from tiengine.indices.index import Index, worst
-from tiengine.indices.ride import Ride
+from tiengine.indices.filters import band_pass, band_pass_settling, sliding_mean
+from tiengine.indices.index import Index, no_limit, worst, worst_of
+from tiengine.indices.ride import Direction, FloorPoint, Ride
 from tiengine.parameters.arrays import Reals
+from tiengine.vehicle.connector import VehicleClass
 
 __all__ = [
+    "ACCELERATION_LIMITS",
+    "BAND",
     "QUOTIENT_LIMIT",
     "axle_force_limit",
     "body_indices",
@@ -32,39 +38,48 @@ __all__ = [
 ]
 
 STANDARD = "EN 14363:2016"
-SAFETY, OTHER = 3.0, 2.2  # k: running safety; track loading and ride characteristics
+SAFETY, OTHER = 3.0, 2.2  # k for running safety; for track loading and ride characteristics
 QUOTIENT_LIMIT = 0.8
-ACCELERATION_LIMIT = 2.5  # m/s^2
+AXLE_FACTORS: dict[VehicleClass | None, float] = {"coach": 1.0, "locomotive": 1.0, "freight": 0.85}
+"""Factor k1 of the limit of the sum of Y by class."""
+ACCELERATION_LIMITS: dict[VehicleClass | None, float] = {"coach": 2.5}
+"""Limit of floor accelerations by class [m/s^2]."""
 BAND = (0.4, 10.0)  # Hz
-FAST = 220.0 / 3.6  # m/s: above it sections are longer
-SECTIONS, ZONE = 25, 10e3  # number and m
+FAST = 220.0 / 3.6  # m/s, above which sections are longer
+SECTIONS, ZONE = 25, 10e3  # least number of sections, least length of a zone [m]
 Q_SPEEDS = (160.0, 200.0, 250.0, 300.0)  # km/h
-Q_CAPS = (200.0, 190.0, 180.0, 170.0, 160.0)  # kN up to each speed, and above the last
+Q_CAPS = (200.0, 190.0, 180.0, 170.0, 160.0)  # kN, up to each speed and above the last one
 
 
 def section_length(speed: float) -> float:
-    """Length of a section [m] at a speed [m/s]."""
+    """Return the length of a section [m] at a speed [m/s]."""
     return 500.0 if speed > FAST + 1e-9 else 250.0
 
 
-def shortfall(way: float, speed: float) -> str:
-    """What a way [m] at a speed [m/s] lacks of a zone, in words; empty if nothing."""
+def shortfall(distance: float, speed: float) -> str:
+    """Say why a distance [m] at a speed [m/s] is too short for a zone; empty if it is long enough."""
     length = section_length(speed)
     needed = max(SECTIONS * length, ZONE)
-    if way >= needed - 1e-6:
+    if distance >= needed - 1e-6:
         return ""
-    return f"way is only {way:.0f} m, a zone has {SECTIONS} sections of {length:g} m, {needed / 1e3:g} km at least"
+    return (
+        f"the run covers only {distance:.0f} m, a zone has {SECTIONS} sections of {length:g} m, {needed / 1e3:g} km at"
+        " least"
+    )
 
 
 def extreme(position: Reals, series: Reals, speed: float, k: float, *, signed: bool = False) -> float:
-    """Largest value in the sense of the standard.
+    """Estimate the maximum of a series by the method of the standard.
 
     Args:
         position: Chainages [m], shape (n,).
         series: Samples, shape (n,).
-        speed: [m/s].
+        speed: Speed of the train [m/s].
         k: Factor of the standard deviation.
-        signed: Only the upper percentile counts, with its sign.
+        signed: Use the upper percentile with its sign only.
+
+    Returns:
+        The value [unit of the series].
     """
     if shortfall(float(position[-1] - position[0]), speed):
         return _percentile(series, signed)
@@ -81,42 +96,44 @@ def _percentile(series: Reals, signed: bool) -> float:
 
 
 def wheel_force_limit(static: float, speed: float) -> float:
-    """Limit of Q [kN]: 90 kN more than the static load, no more than the track bears.
+    """Return the limit of Q [kN]: 90 kN above the static load, capped by speed for the sake of the track.
 
     Args:
         static: Static wheel load [kN].
-        speed: [m/s].
+        speed: Speed of the train [m/s].
     """
     return min(90.0 + static, Q_CAPS[bisect_left(Q_SPEEDS, 3.6 * speed - 1e-6)])
 
 
-def axle_force_limit(static: float) -> float:
-    """Limit of the sum of Y of a wheelset [kN]; k1 = 1: all but freight wagons.
+def axle_force_limit(static: float, vehicle_class: VehicleClass | None) -> float | None:
+    """Return the limit of the sum of Y of a wheelset [kN], k1 (10 + static/3); None for a class without one.
 
     Args:
         static: Static load of the wheelset, both wheels [kN].
+        vehicle_class: Class of the vehicle; None if it is not stated.
     """
-    return 10.0 + static / 3.0
+    factor = AXLE_FACTORS.get(vehicle_class)
+    return None if factor is None else factor * (10.0 + static / 3.0)
 
 
 def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
-    """Y/Q, sum of Y, and Q at the worst wheel or wheelset of a vehicle."""
+    """Yield Y/Q, sum of Y and Q of the worst wheel or wheelset of a vehicle."""
     found: dict[str, list[Index]] = {}
     for w in ride.wheelsets(vehicle):
-        for index in _of_wheelset(ride, vehicle, w):
+        for index in _wheelset_indices(ride, vehicle, w):
             found.setdefault(index.name, []).append(index)
     yield from map(worst, found.values())
 
 
-def _of_wheelset(ride: Ride, vehicle: int, wheelset: int) -> Iterator[Index]:
-    forces = ride.forces(wheelset)
-    speed, lacks = ride.speed, shortfall(ride.way, ride.speed)
+def _wheelset_indices(ride: Ride, vehicle: int, wheelset: int) -> Iterator[Index]:
+    forces, speed, vehicle_class = ride.forces(wheelset), ride.speed, ride.vehicle_classes[vehicle]
+    reason = _shortfall(ride, forces.position)
 
-    def index(name: str, place: str, value: float, unit: str, limit: float, clause: str) -> Index:
+    def index(name: str, place: str, value: float, unit: str, limit: float | None, clause: str) -> Index:
         place = f"wheelset {wheelset + 1}{place}"
         return Index(
             standard=STANDARD, name=name, vehicle=vehicle + 1, place=place, value=value, unit=unit, limit=limit,
-            clause=clause, shortfall=lacks,
+            clause=clause, shortfall=reason, note=no_limit(vehicle_class) if limit is None else "",
         )  # fmt: skip
 
     for i, side in enumerate((" left", " right")):
@@ -126,34 +143,47 @@ def _of_wheelset(ride: Ride, vehicle: int, wheelset: int) -> Iterator[Index]:
         limit = wheel_force_limit(1e-3 * forces.static[i], speed)
         yield index("wheel force Q", side, value, "kN", limit, "7.5.3 track loading")
     value = 1e-3 * extreme(*sliding_mean(forces.position, forces.Y.sum(axis=1)), speed, SAFETY)
-    limit = axle_force_limit(1e-3 * float(forces.static.sum()))
-    yield index("sum of Y, 2 m mean", "", value, "kN", limit, "7.5.2 running safety")
+    axle_limit = axle_force_limit(1e-3 * float(forces.static.sum()), vehicle_class)
+    yield index("sum of Y, 2 m mean", "", value, "kN", axle_limit, "7.5.2 running safety")
 
 
 def body_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
-    """Lateral and vertical acceleration at the worst floor point over a bogie."""
-    long_enough = ride.duration * BAND[0] >= 1.0
-    for direction in ("lateral", "vertical"):
-        found = []
-        for point in ride.floor(vehicle):
-            if not point.over_bogie:
-                continue
-            value = None
-            if long_enough:
-                series = band_pass(getattr(point, direction), ride.body_interval, *BAND)
-                value = extreme(ride.body_position, ride.behind_run_in(series), ride.speed, OTHER)
-            found.append(
-                Index(
-                    standard=STANDARD,
-                    name=f"{direction} acceleration",
-                    vehicle=vehicle + 1,
-                    place=point.name,
-                    value=value,
-                    unit="m/s^2",
-                    limit=ACCELERATION_LIMIT,
-                    clause="7.5.4 ride characteristics",
-                    shortfall=shortfall(ride.way, ride.speed),
-                    note="" if long_enough else "run shorter than a period of 0.4 Hz, 2.5 s",
-                )
-            )
-        yield worst(found)
+    """Yield lateral and vertical acceleration at the worst floor point over a running gear."""
+    points = [point for point in ride.floor(vehicle) if point.over_bogie]
+    directions: tuple[Direction, ...] = ("lateral", "vertical")
+    for direction in directions:
+        yield from worst_of(
+            _acceleration_at(ride, vehicle, point, direction) for point in points if direction in point.acceleration
+        )
+
+
+def _acceleration_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Direction) -> Index:
+    times, vehicle_class = ride.acceleration_times, ride.vehicle_classes[vehicle]
+    limit = ACCELERATION_LIMITS.get(vehicle_class)
+    settling = band_pass_settling(*BAND)
+    position = times.position[times.used(settling)]
+    value, note = (
+        None,
+        f"run shorter than a period of 0.4 Hz, 2.5 s, and {2.0 * settling:g} s of settling of the filter",
+    )
+    if times.duration(settling) * BAND[0] >= 1.0:
+        series = band_pass(point.acceleration[direction], times.interval, *BAND)[times.used(settling)]
+        value, note = extreme(position, series, ride.speed, OTHER), no_limit(vehicle_class) if limit is None else ""
+    return Index(
+        standard=STANDARD,
+        name=f"{direction} acceleration",
+        vehicle=vehicle + 1,
+        place=point.name,
+        value=value,
+        unit="m/s^2",
+        limit=limit,
+        clause="7.5.4 ride characteristics",
+        shortfall=_shortfall(ride, position),
+        note=note,
+    )
+
+
+def _shortfall(ride: Ride, position: Reals) -> str:
+    """Shortfall of the run, or of the chainages that the settling of filters leaves of it [m], shape (n,)."""
+    used = float(position[-1] - position[0]) if len(position) else 0.0
+    return shortfall(ride.distance, ride.speed) or shortfall(used, ride.speed)

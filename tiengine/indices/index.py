@@ -1,12 +1,12 @@
-"""What an index of a standard is: a value beside its limit, with the clause both come from."""
+"""Index of a standard: a value and its limit, with the clause that both come from."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-__all__ = ["Index", "Verdict", "worst"]
+__all__ = ["Index", "Verdict", "no_limit", "worst", "worst_of"]
 
 Verdict = Literal["within", "over", "none"]
 
@@ -17,15 +17,16 @@ class Index:
 
     Attributes:
         standard: Name and edition of the standard.
-        name: What the index is.
-        vehicle: The vehicle, 1 leads.
+        name: Name of the quantity.
+        vehicle: Number of the vehicle, 1 for the leading one.
         place: Wheelset, wheel or floor point that it belongs to.
         value: Value; None where the run is too short for it.
         unit: Unit of value and limit.
         limit: Limit; None where the standard has none.
         clause: Clause of method and limit.
-        shortfall: Why it is an index only and no assessment in the standard's sense; empty for an assessment.
-        note: What else there is to say, such as the standard's class.
+        shortfall: Reason why it is an index only and not an assessment as defined by the standard; empty for an
+            assessment.
+        note: Further information, such as the standard's class.
     """
 
     standard: str
@@ -41,28 +42,46 @@ class Index:
 
     @property
     def kind(self) -> Literal["assessment", "index"]:
-        """Whether run and statistics are those that the standard asks for."""
+        """Whether run and statistics are those that the standard requires."""
         return "index" if self.shortfall else "assessment"
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the value keeps its limit; ``"none"`` without value or limit."""
+        """Whether the value is within its limit; ``"none"`` without value or limit."""
         if self.value is None or self.limit is None:
             return "none"
         return "within" if self.value <= self.limit else "over"
 
     @property
     def severity(self) -> float:
-        """What makes one index worse than another: the part of the limit used, or the value if it has no limit."""
+        """Measure that the worst index has most of: the utilised part of the limit, or the value without a limit."""
         if self.value is None:
             return -1.0
         return self.value / self.limit if self.limit else self.value
 
     def to_dict(self) -> dict[str, Any]:
-        """Fields, kind and verdict, for JSON."""
+        """Return fields, kind and verdict, for JSON."""
         return {**asdict(self), "kind": self.kind, "verdict": self.verdict}
 
 
+def no_limit(vehicle_class: str | None) -> str:
+    """Say why a value has no limit.
+
+    Args:
+        vehicle_class: Class of the vehicle; None if it is not stated.
+    """
+    if vehicle_class is None:
+        return "no limit, since the class of the vehicle is not stated: set its vehicle_class, or use --class"
+    return f"no limit known for vehicles of class {vehicle_class}"
+
+
 def worst(indices: Iterable[Index]) -> Index:
-    """The worst of one index at several places."""
+    """Return the worst of the values of one index at several places."""
     return max(indices, key=lambda index: index.severity)
+
+
+def worst_of(indices: Iterable[Index]) -> Iterator[Index]:
+    """Yield the worst of the values of one index at several places, or nothing if there are none."""
+    found = list(indices)
+    if found:
+        yield worst(found)

@@ -1,10 +1,9 @@
-"""What a reader asks first of a run: largest forces, lift-off, what fastenings, mortar and slabs bear; and where."""
+"""Key figures of a run and their places: wheel forces, loss of contact, loads of fastenings, mortar and slabs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -18,14 +17,14 @@ __all__ = ["KeyFigure", "Summary", "key_figures", "summarise"]
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """One number.
+    """One key figure.
 
     Attributes:
-        name: What it is.
-        value: In ``unit``.
+        name: Name of the quantity.
+        value: Value in ``unit``.
         unit: Unit.
-        where: Wheel, seat or slab and chainage; empty if it has no place.
-        smallest: Whether the smaller is the worse.
+        where: Wheel, seat or slab, and chainage; empty if it has no place.
+        smallest: Whether smaller values are worse.
     """
 
     name: str
@@ -37,13 +36,13 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class Summary:
-    """One number over many trains.
+    """One key figure over many trains.
 
     Attributes:
-        worst: The worst of all.
-        train: Whose it is.
+        worst: The worst of all trains.
+        train: Number of the train that it belongs to.
         median: Median over the trains.
-        band: 5 and 95 %.
+        band: Percentiles 5 and 95 over the trains.
     """
 
     worst: KeyFigure
@@ -53,7 +52,7 @@ class Summary:
 
 
 def key_figures(train: Train) -> list[KeyFigure]:
-    """Numbers of one train; what its file does not hold is left out.
+    """Compute the key figures of one train; those whose data the file lacks are left out.
 
     Args:
         train: The train.
@@ -68,10 +67,10 @@ def key_figures(train: Train) -> list[KeyFigure]:
 
 
 def summarise(trains: Sequence[tuple[int, Sequence[KeyFigure]]]) -> list[Summary]:
-    """The worst, the median and the band of every number.
+    """Compute the worst, the median and the band of every key figure.
 
     Args:
-        trains: Numbers of trains and their figures.
+        trains: Number and key figures of each train.
     """
     groups: dict[str, list[tuple[int, KeyFigure]]] = {}
     for train, figures in trains:
@@ -88,44 +87,44 @@ def summarise(trains: Sequence[tuple[int, Sequence[KeyFigure]]]) -> list[Summary
 
 @dataclass
 class _Extreme:
-    """Largest or smallest of a channel over the wheels so far."""
+    """Largest (sign 1) or smallest (sign -1) value of a channel over all wheels, found slice by slice."""
 
     sign: float
     value: float = -np.inf
     where: str = ""
 
-    def take(self, values: Reals, position: Reals, offset: Reals) -> None:
-        """Samples of shape (n, wheelsets, 2)."""
+    def update(self, values: Reals, position: Reals, offset: Reals) -> None:
+        """Add samples [N], shape (n, wheelsets, 2), at positions [m], shape (n,)."""
         i, w, side = np.unravel_index(int(np.argmax(self.sign * values)), values.shape)
         if self.sign * values[i, w, side] > self.value:
             self.value = float(self.sign * values[i, w, side])
             self.where = f"wheelset {w + 1} {SIDES[side]}, chainage {position[i] + offset[w]:.1f} m"
 
-    def figure(self, name: str, **more: Any) -> KeyFigure:
-        return KeyFigure(name, 1e-3 * self.sign * self.value, "kN", self.where, **more)
+    def figure(self, name: str, *, smallest: bool = False) -> KeyFigure:
+        return KeyFigure(name, 1e-3 * self.sign * self.value, "kN", self.where, smallest)
 
 
 def _wheels(train: Train) -> Iterator[KeyFigure]:
     samples = train.samples("wheel", "vertical_force", "lateral_force")
     offset: Reals = samples.group["wheelset_offset"][:]
-    largest, smallest, sideways = _Extreme(1.0), _Extreme(-1.0), _Extreme(1.0)
+    largest, smallest, lateral = _Extreme(1.0), _Extreme(-1.0), _Extreme(1.0)
     lifted = np.zeros((len(offset), 2))
     for position, channels in samples.slices(_begin(train, samples)):
         Q, Y = channels["vertical_force"], np.abs(channels["lateral_force"])
-        largest.take(Q, position, offset)
-        smallest.take(Q, position, offset)
-        sideways.take(Y, position, offset)
+        largest.update(Q, position, offset)
+        smallest.update(Q, position, offset)
+        lateral.update(Y, position, offset)
         lifted += (Q <= 0.0).sum(axis=0)
     yield largest.figure("largest vertical wheel force Q")
     yield smallest.figure("smallest vertical wheel force Q", smallest=True)
-    yield sideways.figure("largest lateral wheel force |Y|")
+    yield lateral.figure("largest lateral wheel force |Y|")
     w, side = np.unravel_index(int(np.argmax(lifted)), lifted.shape)
     where = f"wheelset {w + 1} {SIDES[side]}" if lifted.any() else ""
     yield KeyFigure("longest time of a wheel off the rail", 1e3 * float(lifted.max()) * samples.interval, "ms", where)
 
 
 def _begin(train: Train, samples: Samples) -> int:
-    """First sample behind the run-in, or the first of all where nothing is behind it."""
+    """First sample after the run-in, or the first of all if the run ends before."""
     begin = samples.after(train.scenario.output.run_in)
     return begin if begin < len(samples) else 0
 
@@ -138,8 +137,8 @@ def _seats(train: Train) -> Iterator[KeyFigure]:
     yield KeyFigure("largest force on a fastening over the sound median", value / median, "-", where)
     value, where = _at_largest(seats, -seats["smallest_vertical_force"], "seat")
     yield KeyFigure("largest uplift of a fastening", max(1e-3 * value, 0.0), "kN", where)
-    sideways = np.maximum(seats["largest_lateral_force"], -seats["smallest_lateral_force"])
-    value, where = _at_largest(seats, sideways, "seat")
+    lateral = np.maximum(seats["largest_lateral_force"], -seats["smallest_lateral_force"])
+    value, where = _at_largest(seats, lateral, "seat")
     yield KeyFigure("largest lateral force on a fastening", 1e-3 * value, "kN", where)
 
 
@@ -156,9 +155,9 @@ def _slabs(train: Train) -> Iterator[KeyFigure]:
         yield KeyFigure(name, scale * value, unit, where)
 
 
-def _at_largest(extremes: Extremes, values: Reals, what: str) -> tuple[float, str]:
-    """Largest value where the train came, and its place."""
+def _at_largest(extremes: Extremes, values: Reals, kind: str) -> tuple[float, str]:
+    """Largest value among the seats or slabs that the train reached, and its place."""
     among = np.where(extremes.reached.reshape(-1, *[1] * (values.ndim - 1)), values, -np.inf)
     place = np.unravel_index(int(np.argmax(among)), among.shape)
     side = f" {SIDES[place[1]]}" if values.ndim > 1 else ""
-    return float(among[place]), f"{what} {extremes.index[place[0]]}{side}, chainage {extremes.chainage[place[0]]:.1f} m"
+    return float(among[place]), f"{kind} {extremes.index[place[0]]}{side}, chainage {extremes.chainage[place[0]]:.1f} m"

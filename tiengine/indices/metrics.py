@@ -1,4 +1,4 @@
-"""All indices of a result, train by train, as values and as JSON; what they mean is told in docs/indices.md."""
+"""All indices of a result, train by train, as values and as JSON; docs/indices.md explains them."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from tiengine.indices import comfort, en14363, gb5599
 from tiengine.indices.index import Index
+from tiengine.indices.recorded_ride import RecordedRide
 from tiengine.indices.ride import Ride
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.recorded import recorded_scenario
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Reader
-    from tiengine.scenario.scenario import Scenario
+    from tiengine.vehicle.connector import VehicleClass
 
-__all__ = ["Metrics", "Spread", "TrainMetrics", "evaluate"]
+__all__ = ["Metrics", "Spread", "TrainMetrics", "evaluate", "train_metrics"]
 
 FORMAT, FORMAT_VERSION = "tiengine-metrics", 1
 METHODS = (
@@ -36,26 +37,26 @@ class TrainMetrics:
     """Indices of one train.
 
     Attributes:
-        train: Its number in the file.
-        way: Way that counts, without the run-in [m].
-        indices: Vehicle by vehicle.
+        train: Number in the file.
+        distance: Distance evaluated, without the run-in [m].
+        indices: Indices, vehicle by vehicle.
     """
 
     train: int
-    way: float
+    distance: float
     indices: tuple[Index, ...]
 
 
 @dataclass(frozen=True)
 class Spread:
-    """One index over the trains of a batch.
+    """One index over all trains.
 
     Attributes:
         worst: The worst of all trains.
-        train: Whose it is.
-        median: Over the trains that have a value; None if there is none.
-        over: Trains beyond the limit.
-        trains: Trains with a value.
+        train: Number of the train that it belongs to.
+        median: Median over the trains that have a value; None if none has.
+        over: Number of trains over the limit.
+        trains: Number of trains with a value.
     """
 
     worst: Index
@@ -71,8 +72,8 @@ class Metrics:
 
     Attributes:
         name: Path of the file.
-        trains: Those that were evaluated.
-        failed: Why others were not, by their number: they did not run to the end.
+        trains: Indices of the trains evaluated.
+        failed: Reasons why other trains did not complete their run, by number.
     """
 
     name: str
@@ -80,7 +81,7 @@ class Metrics:
     failed: dict[int, str]
 
     def spread(self) -> tuple[Spread, ...]:
-        """Every index over all trains; of vehicles of different trains those at the same place in the train."""
+        """Collect every index over all trains, vehicle by vehicle of the train."""
         groups: dict[tuple[str, str, int], list[tuple[int, Index]]] = {}
         for train in self.trains:
             for index in train.indices:
@@ -88,13 +89,13 @@ class Metrics:
         return tuple(map(_spread, groups.values()))
 
     def to_json(self) -> str:
-        """JSON text with a format version."""
+        """Return JSON text with a format version."""
         tables: dict[str, Any] = {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
             "file": self.name,
             "trains": [
-                {"train": t.train, "way_m": t.way, "indices": [index.to_dict() for index in t.indices]}
+                {"train": t.train, "way_m": t.distance, "indices": [index.to_dict() for index in t.indices]}
                 for t in self.trains
             ],
             "failed": {str(train): why for train, why in self.failed.items()},
@@ -102,32 +103,39 @@ class Metrics:
         return json.dumps(tables, indent=2)
 
 
-def evaluate(result: Reader, train: int | None = None) -> Metrics:
+def evaluate(result: Reader, train: int | None = None, vehicle_class: VehicleClass | None = None) -> Metrics:
     """Compute the indices of a result.
 
     Args:
         result: An open file.
         train: Number of one train; all if None.
+        vehicle_class: Class of all vehicles, instead of what their data state.
 
     Raises:
-        InputError: No such train, none that has run to its end, channels are missing, the sampling is too coarse or
-            the run too short.
+        InputError: There is no such train, no train completed its run, channels are missing, the sampling is too coarse
+            or the run too short.
     """
     if train is not None and not 0 <= train < result.trains:
         raise InputError(f"{result.name}: train = {train}: must be from 0 to {result.trains - 1}")
-    asked = range(result.trains) if train is None else [train]
-    failed = {i: why for i, why in result.failures.items() if i in asked}
-    done = [i for i in asked if i not in failed]
-    if not done:
-        raise InputError(f"{result.name}: no train has run to its end: {next(iter(failed.values()), 'there is none')}")
+    selected = range(result.trains) if train is None else [train]
+    failed = {i: why for i, why in result.failures.items() if i in selected}
+    complete = [i for i in selected if i not in failed]
+    if not complete:
+        raise InputError(f"{result.name}: no train completed its run: {next(iter(failed.values()), 'there is none')}")
     members = recorded_scenario(result).members
-    return Metrics(result.name, tuple(_train(result, i, members[i]) for i in done), failed)
+    rides = ((i, RecordedRide(result, i, members[i], vehicle_class)) for i in complete)
+    return Metrics(result.name, tuple(train_metrics(ride, i) for i, ride in rides), failed)
 
 
-def _train(result: Reader, train: int, scenario: Scenario) -> TrainMetrics:
-    ride = Ride(result, train, scenario)
-    vehicles = range(len(ride.vehicles))
-    return TrainMetrics(train, ride.way, tuple(x for v in vehicles for method in METHODS for x in method(ride, v)))
+def train_metrics(ride: Ride, train: int = 0) -> TrainMetrics:
+    """Compute the indices of one ride.
+
+    Args:
+        ride: Signals of the train.
+        train: Number of the train.
+    """
+    vehicles = range(len(ride.vehicle_classes))
+    return TrainMetrics(train, ride.distance, tuple(x for v in vehicles for method in METHODS for x in method(ride, v)))
 
 
 def _spread(entries: Sequence[tuple[int, Index]]) -> Spread:

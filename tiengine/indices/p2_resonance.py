@@ -1,4 +1,4 @@
-"""P2 resonance: the unsprung mass of a wheel and the rail below it, bouncing together on the fastenings.
+"""P2 resonance: the unsprung mass of a wheel and the rail below it vibrating together on the fastenings.
 
 H. H. Jenkins, J. E. Stephenson, G. A. Clayton, G. W. Morland, D. Lyon, The effect of track and vehicle parameters on
 wheel/rail vertical dynamic forces, Railway Engineering Journal 3(1) (1974) 2-16: two masses, the wheel's m_u and the
@@ -7,8 +7,9 @@ foundation k per length; under a load it takes the shape exp(-x)(cos x + sin x),
 
     k_t = 8 EI beta^3,    m_r = 3 m/(2 beta).
 
-P2 is the lower natural frequency, P1 the upper. On slab track k is the fastenings' stiffness over their pitch: slab and
-bed are much stiffer. Undamped, and without shear of the rail, P2 is within some 10 % of where the wheel force peaks
+P2 is the lower natural frequency, P1 the upper. On slab track k is the fastenings' stiffness over their pitch, since
+slab and bed are much stiffer. Without damping and shear of the rail, P2 is within about 10 % of the peak of the wheel
+force
 (``validation/wheel_spectrum.py``).
 """
 
@@ -32,14 +33,14 @@ __all__ = ["contact_stiffness", "p2_frequency", "p2_of"]
 def p2_frequency(
     unsprung: float, contact: float, bending_stiffness: float, mass_per_length: float, foundation: float
 ) -> float:
-    """P2, undamped [Hz].
+    """Compute the undamped P2 frequency [Hz].
 
     Args:
-        unsprung: Mass of a wheel and its share of the axle m_u [kg].
-        contact: Contact spring k_H [N/m].
-        bending_stiffness: EI of the rail [N m^2].
-        mass_per_length: m of the rail [kg/m].
-        foundation: k [N/m^2].
+        unsprung: Mass of a wheel and half its axle m_u [kg].
+        contact: Stiffness of the contact k_H [N/m].
+        bending_stiffness: Bending stiffness EI of the rail [N m^2].
+        mass_per_length: Mass per length m of the rail [kg/m].
+        foundation: Stiffness per length of the foundation k [N/m^2].
     """
     beta = (foundation / (4.0 * bending_stiffness)) ** 0.25
     k_t, m_r = 8.0 * bending_stiffness * beta**3, 1.5 * mass_per_length / beta
@@ -50,11 +51,11 @@ def p2_frequency(
 
 
 def contact_stiffness(parts: Parts, settings: ContactSettings, load: float) -> float:
-    """Slope of Hertz' law for a centred wheelset, 1.5 N^(1/3)/G [N/m].
+    """Compute the slope of Hertz' law for a centred wheelset, 1.5 N^(1/3)/G [N/m].
 
     Args:
-        parts: Give the profiles.
-        settings: Placement and material.
+        parts: Parts of the scenario, of which the profiles are used.
+        settings: Placement and material of the contact.
         load: Normal force N [N].
     """
     pair = WheelRailPair(parts.wheel, parts.rail_profile, settings)
@@ -71,7 +72,7 @@ def contact_stiffness(parts: Parts, settings: ContactSettings, load: float) -> f
 
 
 def p2_of(parts: Parts, settings: ContactSettings) -> float:
-    """P2 of the leading wheelset on a scenario's track [Hz].
+    """Compute the P2 frequency of the leading wheelset on a scenario's track [Hz].
 
     Args:
         parts: Vehicles, profiles, rail, slab and fastening.

@@ -1,4 +1,4 @@
-"""What figures read: groups and channels of one train, in slices, and the train's own scenario."""
+"""One train of a result file: its groups and channels, read in slices, and its scenario."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ if TYPE_CHECKING:
 
 __all__ = ["AbsentError", "Samples", "Train"]
 
-SLICE = 2**15  # samples in memory at a time
-SETTLING = 10.0  # periods of the cut-off that a filter needs at either end of a slice; it forgets within one
+SLICE = 2**15  # samples read at a time
+SETTLING = 10.0  # periods of the cut-off by which a slice is extended for its filter, which decays within one
 
 
 class AbsentError(InputError):
-    """The file lacks what a figure needs; the message names the key to set."""
+    """The file lacks what was requested; the message names the key to set."""
 
 
 class Samples:
-    """A group that is sampled over time, read slice by slice.
+    """A group sampled over time, read slice by slice.
 
     Attributes:
         group: The HDF5 group.
     """
 
     def __init__(self, group: Any, where: str, channels: Sequence[str], key: str) -> None:
-        """Check that the channels are there.
+        """Check that the channels exist.
 
         Args:
             group: The HDF5 group.
             where: File and train, for messages.
             channels: Names of the channels.
-            key: Key of the scenario that names the channels to be written.
+            key: Key of the scenario that selects the channels to be written.
 
         Raises:
             AbsentError: A channel is missing, or there are fewer than two samples.
@@ -55,7 +55,7 @@ class Samples:
         self._where = where
         self._channels = channels
         if len(self) < 2:
-            raise AbsentError(f"{where} has {len(self)} sample(s): too short to draw")
+            raise AbsentError(f"{where} has {len(self)} sample(s), two are needed")
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -63,21 +63,27 @@ class Samples:
 
     @property
     def interval(self) -> float:
-        """Between samples [s]."""
+        """Time between samples [s]."""
         time = self.group["time"]
         return float(time[-1] - time[0]) / (len(self) - 1)
 
     @property
-    def way(self) -> tuple[float, float]:
+    def chainage_range(self) -> tuple[float, float]:
         """Chainage of the first vehicle's centre at the first and at the last sample [m]."""
         position = self.group["position"]
         return float(position[0]), float(position[-1])
 
+    @property
+    def distance(self) -> float:
+        """Distance between the first and the last sample [m]."""
+        begin, end = self.chainage_range
+        return end - begin
+
     def at(self, chainage: float) -> int:
-        """Index of the first sample at or behind a chainage of the first vehicle's centre [m]."""
+        """Return the index of the first sample at or beyond a chainage of the first vehicle's centre [m]."""
         position = self.group["position"]
         low, high = 0, len(self)
-        while low < high:  # bisection in the file
+        while low < high:  # bisection, so that the positions need not be read
             middle = (low + high) // 2
             if position[middle] < chainage:
                 low = middle + 1
@@ -85,53 +91,53 @@ class Samples:
                 high = middle
         return low
 
-    def after(self, way: float) -> int:
-        """Index of the first sample at which the train has run a way [m]."""
-        return self.at(self.way[0] + way)
+    def after(self, distance: float) -> int:
+        """Return the index of the first sample after the train has run a distance [m]."""
+        return self.at(self.chainage_range[0] + distance)
 
     def slices(self, begin: int = 0, end: int | None = None) -> Iterator[tuple[Reals, dict[str, Reals]]]:
-        """Positions [m], shape (n,), and channels, shape (n, ...), of some samples, piece after piece."""
+        """Yield positions [m], shape (n,), and channels, shape (n, ...), of a range of samples, slice by slice."""
         end = len(self) if end is None else end
         for start in range(begin, end, SLICE):
             yield self.read(start, min(start + SLICE, end))
 
     def low_passed(self, cut_off: float, ahead: float = 0.0) -> Iterator[tuple[int, Reals, dict[str, Reals]]]:
-        """Channels behind a low pass, piece after piece; the same as if filtered in one.
+        """Apply a low pass to the channels, slice by slice, with the same result as in one piece.
 
         Args:
-            cut_off: Frequency [Hz].
-            ahead: Way beyond the piece's own samples that comes with it [m].
+            cut_off: Cut-off frequency [Hz].
+            ahead: Distance by which the samples of a slice reach into the next one [m].
 
         Yields:
-            Number of the piece's own samples, positions, channels.
+            Number of samples without those ahead, positions [m], shape (n,), and channels, shape (n, ...).
         """
         margin = int(np.ceil(SETTLING / cut_off / self.interval))
         for start in range(0, len(self), SLICE):
             end = min(start + SLICE, len(self))
-            behind = self.at(float(self.group["position"][end - 1]) + ahead) + 1 if ahead else end
-            first, last = max(start - margin, 0), min(behind + margin, len(self))
+            reach = self.at(float(self.group["position"][end - 1]) + ahead) + 1 if ahead else end
+            first, last = max(start - margin, 0), min(reach + margin, len(self))
             position, channels = self.read(first, last)
-            own = slice(start - first, min(behind, len(self)) - first)
-            smooth = {name: low_pass(values, self.interval, cut_off)[own] for name, values in channels.items()}
-            yield end - start, position[own], smooth
+            kept = slice(start - first, min(reach, len(self)) - first)
+            filtered = {name: low_pass(values, self.interval, cut_off)[kept] for name, values in channels.items()}
+            yield end - start, position[kept], filtered
 
     def read(self, start: int, end: int) -> tuple[Reals, dict[str, Reals]]:
-        """Positions [m] and channels of the samples from ``start`` up to ``end``, in double precision."""
+        """Read positions [m] and channels of the samples from ``start`` up to ``end``, in double precision."""
         channels = {name: self.group[name][start:end].astype(np.float64) for name in self._channels}
         return np.asarray(self.group["position"][start:end]), channels
 
 
 class Train:
-    """One train of a result file and the scenario that it ran.
+    """One train of a result file and its scenario.
 
     Attributes:
         result: The open file.
-        number: The train's number.
-        caption: File, scenario and train, for a figure's head.
+        number: Number of the train.
+        caption: File and train, for the head of a figure.
     """
 
     def __init__(self, result: Reader, number: int = 0) -> None:
-        """Look at a train; nothing is read yet.
+        """Select a train; nothing is read yet.
 
         Raises:
             InputError: There is no such train.
@@ -140,12 +146,12 @@ class Train:
             raise InputError(f"{result.name}: train = {number}: must be from 0 to {result.trains - 1}")
         self.result, self.number = result, number
         self._group = result[f"trains/{number:03d}"]
-        several = f", train {number} of {result.trains}" if result.trains > 1 else ""
-        self.caption = f"{Path(result.name).name}{several}"
+        which = f", train {number} of {result.trains}" if result.trains > 1 else ""
+        self.caption = f"{Path(result.name).name}{which}"
 
     @cached_property
     def scenario(self) -> Scenario:
-        """The train's own."""
+        """Scenario of this train."""
         return recorded_scenario(self.result).members[self.number]
 
     @cached_property
@@ -155,12 +161,12 @@ class Train:
 
     @cached_property
     def static_loads(self) -> Reals:
-        """Wheel loads at rest [N], shape (wheelsets, 2)."""
+        """Static wheel loads [N], shape (wheelsets, 2)."""
         loads: Reals = static_wheel_loads(self.model)
         return loads
 
     def samples(self, name: str, *channels: str) -> Samples:
-        """A group that is sampled over time.
+        """Return a group sampled over time.
 
         Raises:
             AbsentError: The group or a channel is not in the file.
@@ -169,24 +175,24 @@ class Train:
         return Samples(self.group(name, key), f"{self._where}: {name}", channels, key)
 
     def group(self, name: str, key: str) -> Any:
-        """A group of the train.
+        """Return a group of the train.
 
         Args:
-            name: Its name.
-            key: Key of the scenario without which it is not written.
+            name: Name of the group.
+            key: Key of the scenario that has it written.
 
         Raises:
-            AbsentError: It is not in the file.
+            AbsentError: The group is not in the file.
         """
         if name not in self._group or not len(self._group[name]):
             raise AbsentError(f"{self._where} has no {name}; set {key} and run again")
         return self._group[name]
 
-    def way_end(self) -> float:
-        """Chainage of the first vehicle's centre where the train's run ended [m].
+    def last_chainage(self) -> float:
+        """Return the chainage of the first vehicle's centre at the end of the run [m].
 
         Raises:
-            AbsentError: The file holds no samples over time at all.
+            AbsentError: The file holds no samples over time.
         """
         for group in self._group.values():
             if "position" in group and len(group["position"]):
@@ -195,5 +201,5 @@ class Train:
 
     @property
     def _where(self) -> str:
-        several = f": train {self.number}" if self.result.trains > 1 else ""
-        return f"{Path(self.result.name).name}{several}"
+        which = f": train {self.number}" if self.result.trains > 1 else ""
+        return f"{Path(self.result.name).name}{which}"

@@ -30,7 +30,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         InputError: Parts that do not fit together.
     """
     parts, numerics = scenario.parts, scenario.numerics
-    train = assemble(parts.vehicles, parts.centres, series_springs=scenario.train.series_springs or None)
+    asked = scenario.train
+    train = assemble(parts.vehicles, parts.centres, series_springs=asked.series_springs or None, effort=asked.effort)
     return Ingredients(
         rail=parts.rail,
         fastening=parts.fastening,

@@ -19,7 +19,7 @@ from tiengine.recording.deflection import Deflection
 from tiengine.recording.gauge_samples import gauge_samples
 from tiengine.recording.seat_envelopes import SeatEnvelopes
 from tiengine.recording.slab_envelopes import SlabEnvelopes
-from tiengine.result_files.channels import DEFLECTION, GAUGE_FORCE, GAUGE_MOTION, SEATS, SLABS
+from tiengine.result_files.channels import DEFLECTION, SEATS, SLABS
 from tiengine.result_files.layout import DTYPES, Block, GroupSpec
 from tiengine.scenario.gauges import Gauge, nearest_seat
 from tiengine.scenario.scenario import Scenario
@@ -123,7 +123,7 @@ class Trackside:
 
     def _cast(self, block: Block) -> Block:
         channels = {name: np.array(value, self.dtype) for name, value in block.channels.items()}
-        return Block(block.along, block.place, channels)
+        return Block(block.along, block.chainage, channels)
 
 
 ENVELOPES = {"seats": SEATS, "slabs": SLABS}
@@ -147,9 +147,9 @@ def _gauge_group(gauge: Gauge, slab: Slab) -> GroupSpec:
     if gauge.on == "fastening":
         seat = nearest_seat(gauge.chainage, slab)
         known = {"on": gauge.on, "chainage": (seat + 0.5) * slab.fastening_pitch, "seat": seat, "side": gauge.side}
-        return GroupSpec((), GAUGE_FORCE, attributes=known)
+        return GroupSpec.gauge("force", known)
     where = {"side": gauge.side} if gauge.on == "rail" else {"y": gauge.y}
-    return GroupSpec(("direction",), GAUGE_MOTION, attributes={"on": gauge.on, "chainage": gauge.chainage, **where})
+    return GroupSpec.gauge("motion", {"on": gauge.on, "chainage": gauge.chainage, **where})
 
 
 def _watchers(scenario: Scenario, stepper: Stepper) -> Iterator[tuple[str, Watcher]]:

@@ -1,1 +1,1 @@
-"""Reports: pages and tables about a result or a contact geometry."""
+"""Reports: pages and tables of a result or of a contact geometry."""

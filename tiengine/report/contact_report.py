@@ -1,7 +1,7 @@
-"""What ``tiengine contact`` shows of a wheel on a rail: rolling-radius difference, conicity, points of contact.
+"""Contact geometry of a wheel on a rail, for ``tiengine contact``: rolling radii, conicity, contact points.
 
-The wheelset is shifted sideways on straight track, its roll follows (:mod:`tiengine.contact.conicity`). Conicity is
-that of harmonic linearisation; what EN 15302 gets by integrating the motion is compared in ``docs/files.md``.
+The wheelset is shifted laterally on straight track (:mod:`tiengine.contact.conicity`). Conicity is that of harmonic
+linearisation, with the wheelset's roll, or that of EN 15302, by integrating the motion without roll.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tiengine.contact.conicity import equivalent_conicity, wheelset_position
+from tiengine.contact.conicity import en15302_conicity, equivalent_conicity, unrolled_position, wheelset_position
 from tiengine.contact.profile import Profile
 from tiengine.contact.table import ContactSettings, WheelRailPair
 from tiengine.figures.palette import BLUE, GREEN, ORANGE, VERMILION
@@ -23,20 +23,28 @@ from tiengine.parameters.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ContactReport", "contact_report", "draw"]
+__all__ = ["METHODS", "ContactReport", "Method", "contact_report", "draw"]
+
+Method = Literal["harmonic", "en15302"]
+METHODS = {
+    "harmonic": (wheelset_position, equivalent_conicity, "harmonic linearisation, with roll"),
+    "en15302": (unrolled_position, en15302_conicity, "EN 15302, without roll"),
+}
+"""Position of the wheelset, equivalent conicity and description of each method."""
 
 REFERENCE_AMPLITUDE = 3e-3
 """Amplitude at which conicities are compared [m], EN 15302."""
 SHIFT_STEP = 0.05e-3
+"""Step of the lateral shift [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContactReport:
-    """Contact of a wheelset over its shift to the right.
+    """Contact of a wheelset over its lateral shift to the right.
 
     Attributes:
         pair: Wheel and rail.
-        shift: Shifts y [m], shape (n,), from the largest to the left to the largest to the right.
+        shift: Shifts y [m], shape (n,), from the largest one to the left to the largest one to the right.
         radius_difference: Right less left rolling radius [m], shape (n,).
         roll: Roll, right-handed about x forward [rad], shape (n,).
         wheel_station: Contact on the right wheel, outward from the tape circle [m], shape (n,).
@@ -44,6 +52,7 @@ class ContactReport:
         contact_angle: Inclination of the right contact, positive where the rail falls inward [rad], shape (n,).
         amplitude: Amplitudes A [m], shape (k,).
         conicity: Equivalent conicity at A, shape (k,).
+        method: How conicity is computed, a key of :data:`METHODS`.
     """
 
     pair: WheelRailPair
@@ -55,6 +64,7 @@ class ContactReport:
     contact_angle: Reals
     amplitude: Reals
     conicity: Reals
+    method: Method = "harmonic"
 
     @property
     def reference_conicity(self) -> float:
@@ -62,16 +72,16 @@ class ContactReport:
         return float(self.conicity[np.argmin(np.abs(self.amplitude - REFERENCE_AMPLITUDE))])
 
     def rows(self) -> list[tuple[str, str]]:
-        """Words and values of the table on screen."""
-        rows = [("equivalent conicity at 3 mm", f"{self.reference_conicity:.4f}")]
+        """Return names and values of the table on screen."""
+        rows = [("equivalent conicity at 3 mm", f"{self.reference_conicity:.4f}"), ("method", METHODS[self.method][2])]
         for A, conicity in zip(self.amplitude[1::2], self.conicity[1::2], strict=False):
             difference = float(np.interp(A, self.shift, self.radius_difference))
-            words = f"rolling-radius difference {difference * 1e3:.3f} mm, conicity {conicity:.4f}"
-            rows.append((f"{A * 1e3:g} mm", words))
+            value = f"rolling-radius difference {difference * 1e3:.3f} mm, conicity {conicity:.4f}"
+            rows.append((f"{A * 1e3:g} mm", value))
         return rows
 
     def to_json(self) -> str:
-        """All numbers, in SI, as JSON."""
+        """Return all numbers, in SI units, as JSON."""
         placement = {"gauge", "gauge_depth", "cant", "half_spacing", "wheel_radius"}
         settings = self.pair.settings.model_dump(include=placement)
         content: dict[str, Any] = {
@@ -79,6 +89,7 @@ class ContactReport:
             "rail": self.pair.rail.name,
             "settings": settings,
             "units": {"length": "m", "angle": "rad", "conicity": "-"},
+            "method": self.method,
             "conicity_at_3mm": self.reference_conicity,
         }
         names = ("shift", "radius_difference", "roll", "wheel_station", "rail_station", "contact_angle")
@@ -86,24 +97,28 @@ class ContactReport:
         return json.dumps(content, indent=1)
 
 
-def contact_report(wheel: Profile, rail: Profile, settings: ContactSettings, largest: float = 8e-3) -> ContactReport:
-    """Compute contact geometry.
+def contact_report(
+    wheel: Profile, rail: Profile, settings: ContactSettings, largest: float = 8e-3, method: Method = "harmonic"
+) -> ContactReport:
+    """Compute the contact geometry.
 
     Args:
         wheel: Wheel profile.
         rail: Rail profile.
-        settings: Gauge, cant, tape circles' distance, radius.
+        settings: Gauge, cant, spacing of the tape circles, wheel radius.
         largest: Largest shift and amplitude [m].
+        method: How conicity is computed, a key of :data:`METHODS`.
 
     Raises:
-        InputError: ``largest`` is below 3 mm, or profiles that do not reach as far as the shift.
+        InputError: ``largest`` is not between 3 and 20 mm, or a profile ends before the shift is reached.
     """
     if not REFERENCE_AMPLITUDE <= largest <= 20e-3:
         raise InputError(f"largest shift = {largest * 1e3:g} mm: must be 3 to 20 mm")
     pair = WheelRailPair(wheel, rail, settings)
     half = round(largest / SHIFT_STEP)
     shift: Reals = SHIFT_STEP * np.arange(-half, half + 1, dtype=np.float64)
-    position = wheelset_position(pair, shift)
+    take_position, conicity, _ = METHODS[method]
+    position = take_position(pair, shift)
     amplitude: Reals = 0.5e-3 * np.arange(1, int(largest / 0.5e-3 + 1e-9) + 1, dtype=np.float64)
     return ContactReport(
         pair=pair,
@@ -114,19 +129,20 @@ def contact_report(wheel: Profile, rail: Profile, settings: ContactSettings, lar
         rail_station=position.right.s_r,
         contact_angle=np.arctan(position.right.tan_gamma),
         amplitude=amplitude,
-        conicity=equivalent_conicity(pair, amplitude),
+        conicity=conicity(pair, amplitude),
+        method=method,
     )
 
 
 def draw(report: ContactReport, path: Path) -> None:
-    """Draw rolling-radius difference, conicity, and the profiles with lines between points in contact.
+    """Draw rolling-radius difference, conicity, and the profiles with lines between contact points.
 
     Args:
-        report: What to draw.
-        path: Figure; the suffix tells the format.
+        report: The contact geometry.
+        path: Path of the figure; the suffix selects the format.
 
     Raises:
-        InputError: A suffix that is no format of figures, or a file that cannot be written.
+        InputError: The suffix is not a figure format, or the file cannot be written.
     """
     from matplotlib.figure import Figure
 
@@ -165,6 +181,7 @@ def _draw_conicity(axes: Axes, report: ContactReport) -> None:
     axes.plot(report.amplitude * 1e3, report.conicity, color=BLUE, marker="o", markersize=3)
     axes.plot(3.0, value, "s", color=VERMILION, label=f"{value:.4f} at 3 mm")
     axes.set(xlabel="amplitude [mm]", ylabel="equivalent conicity [-]", xlim=(0.0, None), ylim=(0.0, None))
+    axes.set_title(METHODS[report.method][2], fontsize="small")
     axes.grid(alpha=0.3)
     axes.legend()
 
@@ -184,7 +201,7 @@ def _draw_angle(axes: Axes, report: ContactReport) -> None:
 
 
 def _draw_profiles(axes: Axes, report: ContactReport) -> None:
-    """The right wheel in its place, lifted off the rail, at one scale; lines join what touches at each millimetre."""
+    """Draw the right wheel lifted off its rail, to scale, with lines between contact points every millimetre."""
     pair, lift = report.pair, 14.0
     offset = (pair.settings.half_spacing - pair.crown_offset) * 1e3
     s, o = np.linspace(*pair.wheel.span, 600), np.linspace(*pair.canted_rail.span, 600)
@@ -197,7 +214,7 @@ def _draw_profiles(axes: Axes, report: ContactReport) -> None:
         ends = [offset + wheel * 1e3, rail * 1e3]
         heights = [float(pair.wheel.height(wheel)) * 1e3 - lift, float(pair.canted_rail.height(rail)) * 1e3]
         axes.plot(ends, heights, "o-", color=VERMILION, markersize=3, linewidth=0.8)
-        if abs(ends[0] - labelled) > 2.5 or i == middle:  # else the numbers overlap
+        if abs(ends[0] - labelled) > 2.5 or i == middle:  # otherwise the labels overlap
             labelled = ends[0]
             label = f"{report.shift[i] * 1e3:.0f}"
             axes.annotate(label, (ends[0], heights[0]), (0, 5), textcoords="offset points", ha="center", fontsize=7)

@@ -1,4 +1,4 @@
-"""Indices on the screen."""
+"""Table of the indices on screen."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COLOURS = {"within": "green", "over": "bold red", "none": "dim"}
 
 
 def metrics_table(metrics: Metrics) -> RenderableType:
-    """A table of one train's indices, or of the worst and the median over several trains; notes below it."""
+    """Build a table of one train's indices, or of the worst and the median over several trains, with notes below it."""
     spread = metrics.spread()
     several = len(metrics.trains) > 1
     table = Table(box=None, pad_edge=False)
@@ -50,11 +50,11 @@ def metrics_table(metrics: Metrics) -> RenderableType:
 
 
 def notes(indices: Iterable[Index], metrics: Metrics) -> list[str]:
-    """What a table of indices leaves out, each sentence once.
+    """Collect the notes below a table of indices, each one once.
 
     Args:
-        indices: Those of the table.
-        metrics: Say which trains are missing.
+        indices: The indices of the table.
+        metrics: Metrics that they belong to, which know the trains left out.
     """
     found: dict[str, None] = {}
     for index in indices:

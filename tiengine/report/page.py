@@ -1,6 +1,6 @@
-"""A result as one HTML page that needs nothing else: no network, no script, pictures inside.
+"""Report of a result as one self-contained HTML page: no network, no scripts, pictures embedded.
 
-The page is ``tiengine/library/report.html.jinja``; everything that comes from the file is escaped on its way into it.
+The template is ``tiengine/library/report.html.jinja``; all text from the file is escaped when it is inserted.
 """
 
 from __future__ import annotations
@@ -32,32 +32,33 @@ if TYPE_CHECKING:
 
 __all__ = ["render", "write"]
 
-MOST = 100  # rows of failures and events
+MOST = 100  # rows of failures, and of events
 
 
 @dataclass(frozen=True)
 class _Picture:
     name: str
     title: str
-    look_for: str
+    caption: str
     image: str
 
 
 def render(result: Result, train: int | None = None) -> str:
-    """The page.
+    """Render the page.
 
     Args:
         result: An open file.
-        train: Whose figures are drawn; the first that ran to its end if None. Numbers and indices are those of all.
+        train: Number of the train whose figures are drawn; the first complete one if None. Key figures and indices are
+            those of all trains.
 
     Returns:
-        HTML.
+        The page as HTML.
 
     Raises:
         InputError: There is no such train.
     """
-    done = [i for i in range(result.trains) if result.status(i) == COMPLETE]
-    shown = Train(result, train if train is not None else done[0] if done else 0).number
+    complete = [i for i in range(result.trains) if result.status(i) == COMPLETE]
+    shown = Train(result, train if train is not None else complete[0] if complete else 0).number
     environment = Environment(
         loader=PackageLoader("tiengine", "library"), autoescape=True, undefined=StrictUndefined, trim_blocks=False
     )
@@ -71,11 +72,13 @@ def render(result: Result, train: int | None = None) -> str:
         "trains": result.trains,
         "several": several,
         "notice": _notice(result),
-        "hint": f"Numbers are those of all trains; figures of one train show train {shown}." if several else "",
+        "hint": f"Key figures and indices are those of all trains; figures of a single train show train {shown}."
+        if several
+        else "",
         "scenario": scenario_words(result.scenario),
         "toml": result.scenario_toml,
         "figures_of_one": [] if several else key_figures(Train(result, shown)),
-        "summaries": summarise([(i, key_figures(Train(result, i))) for i in done]) if several else [],
+        "summaries": summarise([(i, key_figures(Train(result, i))) for i in complete]) if several else [],
         **_indices(result),
         "figures": pictures,
         "absent": absent,
@@ -89,15 +92,15 @@ def render(result: Result, train: int | None = None) -> str:
 
 
 def write(result: Result, path: Path, train: int | None = None) -> None:
-    """Write the page, replacing one.
+    """Write the page to a file, which it replaces.
 
     Args:
         result: An open file.
-        path: Where; ends in .html.
+        path: Path of the page; ends in .html or .htm.
         train: See :func:`render`.
 
     Raises:
-        InputError: Another suffix, no such train, or a path that cannot be written.
+        InputError: The suffix is another one, there is no such train, or the path cannot be written.
     """
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"output = {str(path)!r}: its suffix must be .html or .htm")
@@ -110,18 +113,18 @@ def write(result: Result, path: Path, train: int | None = None) -> None:
 
 
 def _notice(result: Result) -> str:
-    """What a reader must know before all else."""
+    """Notice at the head of the page about runs that are not complete; empty if all are."""
     failed = len(result.failures)
     if result.trains > 1:
-        return f"{failed} of {result.trains} trains did not run to their end; they are left out." if failed else ""
+        return f"{failed} of {result.trains} trains did not complete their run and are left out." if failed else ""
     if result.status() == COMPLETE:
         return ""
     why = result.status() or "unknown status"
-    return f"The run did not come to its end: {why}. What follows is what was computed until then."
+    return f"The run is not complete: {why}. This page shows the results up to that point."
 
 
 def _indices(result: Result) -> dict[str, Any]:
-    """Indices by standard and vehicle, notes, and one sentence on all of them."""
+    """Indices by standard and vehicle, their notes, and an overall verdict."""
     try:
         metrics = result.metrics()
     except InputError as error:
@@ -132,28 +135,28 @@ def _indices(result: Result) -> dict[str, Any]:
     for each in spread:
         vehicle = f"vehicle {each.worst.vehicle}, " if len(vehicles) > 1 else ""
         groups.setdefault(f"{vehicle}{each.worst.standard}", []).append(each)
-    found = [each.worst for each in spread]
+    indices = [each.worst for each in spread]
     return {
         "indices": list(groups.items()),
-        "notes": notes(found, metrics),
-        "verdict": _all_in_one(found, metrics),
+        "notes": notes(indices, metrics),
+        "verdict": _overall_verdict(indices, metrics),
         "no_indices": "",
     }
 
 
-def _all_in_one(found: Sequence[Index], metrics: Metrics) -> dict[str, Any]:
-    judged = [index for index in found if index.verdict != "none"]
+def _overall_verdict(indices: Sequence[Index], metrics: Metrics) -> dict[str, Any]:
+    judged = [index for index in indices if index.verdict != "none"]
     over = [index for index in judged if index.verdict == "over"]
-    of = " (worst of all trains)" if len(metrics.trains) > 1 else ""
-    count = f"{len(judged)} of {len(found)} indices have a value and a limit{of}"
+    worst = " (worst of all trains)" if len(metrics.trains) > 1 else ""
+    count = f"{len(judged)} of {len(indices)} indices have a value and a limit{worst}"
     if not over:
-        return {"over": False, "words": f"{count}: all are within." if judged else f"{count}."}
+        return {"over": False, "text": f"{count}: all are within the limit." if judged else f"{count}."}
     names = "; ".join(f"{index.standard}, {index.name} at {index.place}" for index in over)
-    return {"over": True, "words": f"{count}: {len(over)} over the limit ({names})."}
+    return {"over": True, "text": f"{count}: {len(over)} over the limit ({names})."}
 
 
 def _pictures(result: Result, train: int) -> tuple[list[_Picture], list[tuple[str, str]]]:
-    """All figures that the file can give, and why not the others."""
+    """All figures that the file has the data for, and the reasons why others are absent."""
     pictures, absent = [], []
     for kind in KINDS:
         try:
@@ -161,12 +164,12 @@ def _pictures(result: Result, train: int) -> tuple[list[_Picture], list[tuple[st
         except AbsentError as error:
             absent.append((kind.title, str(error)))
         else:
-            pictures.append(_Picture(kind.name, kind.title, kind.look_for, image))
+            pictures.append(_Picture(kind.name, kind.title, kind.caption, image))
     return pictures, absent
 
 
 def _events(result: Result) -> Iterator[dict[str, Any]]:
-    """Rows of all trains' tables of events; older files have none."""
+    """Yield the events of all trains; older files have none."""
     for train in range(result.trains):
         node = result[f"trains/{train:03d}"]
         if "events" not in node:
@@ -178,7 +181,7 @@ def _events(result: Result) -> Iterator[dict[str, Any]]:
 
 
 def _facts(result: Result, train: int) -> Iterator[tuple[str, str]]:
-    """Sizes, times, versions and machine of the run."""
+    """Yield sizes, times, versions and machine of the run."""
     attributes = result.attributes
     yield "file", result.name
     yield from summary(attributes)
@@ -195,7 +198,7 @@ def _facts(result: Result, train: int) -> Iterator[tuple[str, str]]:
 
 
 def _contents(content: dict[str, Any]) -> list[tuple[str, str]]:
-    """Anchors and words of the table of contents."""
+    """Anchors and headings of the table of contents."""
     entries = [
         ("scenario", "Scenario"),
         ("numbers", "Key figures"),
@@ -212,11 +215,11 @@ def _number(value: float | None) -> str:
 
 
 def _unit(unit: str) -> str:
-    """A unit with its exponent raised."""
+    """Print a unit with a raised exponent."""
     return unit.replace("^2", "²")
 
 
 def _verdict(index: Index) -> str:
-    """A verdict in words that need no colour."""
+    """Print a verdict in words, so that it does not depend on colour."""
     missing = "no value" if index.value is None else "no limit"
     return {"within": "within the limit", "over": "OVER THE LIMIT", "none": missing}[index.verdict]

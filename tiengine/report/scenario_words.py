@@ -1,4 +1,4 @@
-"""A scenario in sentences: what runs, over what, with which defects, and how it is computed."""
+"""Scenario in sentences: train, track, irregularity, defects and numerics."""
 
 from __future__ import annotations
 
@@ -18,10 +18,13 @@ __all__ = ["scenario_words"]
 
 
 def scenario_words(scenario: Scenario) -> list[tuple[str, str]]:
-    """Headings and sentences.
+    """Describe a scenario.
 
     Args:
-        scenario: One train's, or an ensemble's.
+        scenario: Scenario of one train or of an ensemble.
+
+    Returns:
+        Headings and sentences.
     """
     rows = [
         ("Train", _train(scenario)),

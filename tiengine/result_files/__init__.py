@@ -1,1 +1,1 @@
-"""Reader files: their layout, writing and reading, journal, checkpoints, exports."""
+"""Result files: layout, writer and reader, journal, checkpoints, export."""

@@ -1,8 +1,9 @@
-"""Channels of a result as columns: what CSV and Parquet take, read piece by piece.
+"""Channels of a result as the columns of a table, for CSV and Parquet, read in pieces.
 
-A column is named after group, channel and labels, joined by points, with the unit in brackets:
-``wheel.vertical_force.1.left [N]``, ``body.acceleration.frame_1.z [m/s^2]``. The rows are those of the channels' first
-dimension, mostly time; what is known along it comes first: ``time [s]``, ``position [m]``.
+A column is named by group, channel and labels, joined by points, with the unit in brackets:
+``wheel.vertical_force.1.left [N]``, ``body.acceleration.frame_1.z [m/s^2]``. The rows follow
+the first dimension of the channels, usually time; its coordinates are the first columns: ``time [s]``,
+``position [m]``.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ from tiengine.result_files.reader import OPTIONAL
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Reader
 
-__all__ = ["ChannelTable", "Column", "channel_table", "chosen", "labels_of"]
+__all__ = ["ChannelTable", "Column", "channel_table", "labels_of", "select_channels"]
 
 DEFAULT = ("wheel",)
 
 
 @dataclass(frozen=True)
 class Column:
-    """Head of one column.
+    """Heading of one column.
 
     Attributes:
         name: Group, channel and labels, joined by points.
         unit: SI unit, ``"1"`` for none.
-        long_name: What the channel is, in words.
+        long_name: Description of the channel.
     """
 
     name: str
@@ -48,12 +49,12 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class ChannelTable:
-    """Datasets of common rows, cut into columns.
+    """Datasets with common rows, divided into columns.
 
     Attributes:
         rows: Number of rows.
-        columns: Heads of the columns.
-        datasets: What the columns are taken from, in their order; all have the same first dimension.
+        columns: Headings of the columns.
+        datasets: Sources of the columns, in the same order; all have the same first dimension.
     """
 
     rows: int
@@ -61,13 +62,13 @@ class ChannelTable:
     datasets: tuple[Any, ...]
 
     def pieces(self, values: int) -> Iterator[list[NDArray[Any]]]:
-        """All columns, so many rows at a time that a piece holds about so many numbers.
+        """All columns, in pieces of consecutive rows.
 
         Args:
-            values: Numbers in memory at a time.
+            values: Largest number of values in a piece; a piece holds at least one row.
 
         Yields:
-            One array a column, in the precision of the file, shape (rows of the piece,).
+            One array per column, in the precision of the file, shape (rows of the piece,).
         """
         step = max(1, values // len(self.columns))
         for first in range(0, self.rows, step):
@@ -75,16 +76,16 @@ class ChannelTable:
             yield [column for block in blocks for column in block.reshape(len(block), -1).T]
 
 
-def chosen(result: Reader, train: int, names: Sequence[str]) -> dict[str, Any]:
-    """Datasets of some channels.
+def select_channels(result: Reader, train: int, names: Sequence[str]) -> dict[str, Any]:
+    """Select channels of one train by name.
 
     Args:
         result: Open result.
         train: Index of the train.
-        names: Groups or channels, ``"body"``, ``"wheel/vertical_force"``; the wheels' if empty.
+        names: Groups or channels, for example ``"body"`` or ``"wheel/vertical_force"``; the group ``wheel`` if empty.
 
     Returns:
-        Datasets by path within the train, in the order of the names and, within a group, of the file.
+        Datasets by their path within the train, in the order of the names and, within a group, in that of the file.
 
     Raises:
         InputError: There is no such train, group or channel.
@@ -98,7 +99,7 @@ def chosen(result: Reader, train: int, names: Sequence[str]) -> dict[str, Any]:
         matches = {path: known[path] for path in known if path == wanted or path.startswith(f"{wanted}/")}
         if not matches:
             if wanted.partition("/")[0] in OPTIONAL:
-                _ = result[f"trains/{train:03d}/{wanted}"]  # says which key to set, if the whole group is missing
+                _ = result[f"trains/{train:03d}/{wanted}"]  # a missing group: its error names the key
             groups = {path.rpartition("/")[0] for path in known}
             raise InputError(f"{result.name}: no channel {name!r}{nearest(wanted, [*known, *sorted(groups)])}")
         found |= matches
@@ -106,55 +107,55 @@ def chosen(result: Reader, train: int, names: Sequence[str]) -> dict[str, Any]:
 
 
 def channel_table(result: Reader, train: int = 0, names: Sequence[str] = ()) -> ChannelTable:
-    """Some channels of one train as a table.
+    """Table of channels of one train.
 
     Args:
         result: Open result.
         train: Index of the train.
-        names: Groups or channels, as of :func:`chosen`.
+        names: Groups or channels, as in :func:`select_channels`.
 
     Returns:
-        The table; nothing has been read but labels.
+        The table; only labels have been read.
 
     Raises:
-        InputError: There is no such train or channel, or the channels have no common rows.
+        InputError: There is no such train or channel, or the channels do not have the same rows.
     """
-    datasets = chosen(result, train, names)
+    datasets = select_channels(result, train, names)
     paths = list(datasets)
     rows = _row_scale(datasets[paths[0]])
     for path, dataset in datasets.items():
         if _row_scale(dataset) != rows:
             raise InputError(
-                f"{result.name}: {paths[0]} and {path} have different rows ({_rows_in_words(datasets[paths[0]])},"
-                f" {_rows_in_words(dataset)}); a table holds one kind, export them one by one"
+                f"{result.name}: {paths[0]} and {path} have different rows ({_describe_rows(datasets[paths[0]])},"
+                f" {_describe_rows(dataset)}); the channels of a table must have the same rows, export them separately"
             )
-    along = {_name(rows): rows, **_known_along(datasets[paths[0]].parent, rows)}
-    columns = [Column(name, *_meaning(dataset)) for name, dataset in along.items()]
+    coordinates = {_name(rows): rows, **_row_coordinates(datasets[paths[0]].parent, rows)}
+    columns = [Column(name, *_meaning(dataset)) for name, dataset in coordinates.items()]
     for path, dataset in datasets.items():
         columns += _columns(path, dataset)
-    return ChannelTable(rows.shape[0], tuple(columns), (*along.values(), *datasets.values()))
+    return ChannelTable(rows.shape[0], tuple(columns), (*coordinates.values(), *datasets.values()))
 
 
 def labels_of(dataset: Any, axis: int) -> list[str]:
-    """Labels along one dimension of a channel, as texts without blanks.
+    """Labels along one dimension of a channel, as strings without blanks.
 
     Args:
         dataset: Channel.
-        axis: Its dimension.
+        axis: Index of the dimension.
     """
     scales = dataset.dims[axis].values()
     if not scales:
         return [str(i) for i in range(dataset.shape[axis])]
     scale = scales[0]
     group = dataset.parent
-    if _name(scale) == "point" and "offset" in group:  # metres ahead of the train say more than a number
+    if _name(scale) == "point" and "offset" in group:  # the offset in metres is more informative than the index
         return [f"{offset:g}" for offset in group["offset"][:]]
     values = scale.asstr()[:] if h5py.check_string_dtype(scale.dtype) else scale[:]
     return [str(value).replace(" ", "_") for value in values]
 
 
 def _datasets(node: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Every dataset below a group, with its path."""
+    """Datasets below a group, each with its path."""
     for name, child in node.items():
         if isinstance(child, h5py.Group):
             yield from _datasets(child, f"{prefix}{name}/")
@@ -163,12 +164,12 @@ def _datasets(node: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _row_scale(dataset: Any) -> Any:
-    """Scale of the first dimension; groups sampled together share it."""
+    """Dimension scale of the rows; groups sampled together share it."""
     return dataset.dims[0][0]
 
 
-def _known_along(group: Any, rows: Any) -> dict[str, Any]:
-    """Coordinates of a group that have one number a row."""
+def _row_coordinates(group: Any, rows: Any) -> dict[str, Any]:
+    """Coordinates of a group with one value per row, the scale of the rows excepted."""
     return {
         name: child
         for name, child in group.items()
@@ -188,7 +189,7 @@ def _columns(path: str, dataset: Any) -> Iterator[Column]:
     stem = path.replace("/", ".")
     for index in product(*(range(len(names)) for names in labels)):
         name = ".".join([stem, *(names[i] for names, i in zip(labels, index, strict=True))])
-        by_last = len(units) > 1 and len(units) == len(labels[-1])  # one unit a degree of freedom
+        by_last = len(units) > 1 and len(units) == len(labels[-1])  # one unit per degree of freedom
         yield Column(name, units[index[-1]] if by_last else unit, long_name)
 
 
@@ -200,5 +201,5 @@ def _name(scale: Any) -> str:
     return str(scale.name).rpartition("/")[2]
 
 
-def _rows_in_words(dataset: Any) -> str:
+def _describe_rows(dataset: Any) -> str:
     return f"{dataset.shape[0]} of {_name(_row_scale(dataset))}"

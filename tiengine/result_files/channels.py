@@ -1,7 +1,7 @@
-"""What a run records: names, units and meaning of every channel of the result file.
+"""Names, units and meaning of the channels of a result file; their dimensions are in :mod:`.layout`.
 
-The names are an interface: other people's scripts read them. Forces are those of the wheel on the rail in
-the track frame (x forward, y right, z down): vertical positive down, lateral positive to the right.
+The names are a public interface: scripts of users rely on them. Forces act from the wheel on the rail, in the
+track frame (x forward, y right, z down): vertical positive down, lateral positive to the right.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ class Channel(NamedTuple):
     """One recorded quantity.
 
     Attributes:
-        units: SI unit; several by degree of freedom are separated by commas.
-        long_name: What it is, in words.
+        units: SI unit; one per degree of freedom, separated by commas, where they differ.
+        long_name: Description.
     """
 
     units: str
@@ -45,7 +45,6 @@ WHEEL = {
     "lateral_creep_force": Channel("N", "lateral creep force on the wheel, in the contact plane"),
     "spin_moment": Channel("N m", "spin creep moment on the wheel about the contact normal"),
 }
-"""Dimensions (time, wheelset, side)."""
 
 BODY = {
     "displacement": Channel("m, m, rad, rad, rad", "displacement of the body: y, z, roll, pitch, yaw"),
@@ -54,20 +53,18 @@ BODY = {
         "m/s^2, m/s^2, rad/s^2, rad/s^2, rad/s^2", "acceleration of the body: y, z, roll, pitch, yaw"
     ),
 }
-"""Dimensions (time, body, dof)."""
 
 IRREGULARITY = {
-    "vertical": Channel("m", "vertical irregularity as felt at the wheel, positive down"),
-    "lateral": Channel("m", "lateral irregularity as felt at the wheel, positive to the right"),
+    "vertical": Channel("m", "vertical irregularity under the wheel, positive down"),
+    "lateral": Channel("m", "lateral irregularity under the wheel, positive to the right"),
 }
-"""Dimensions (time, wheelset, side)."""
 
 MORTAR = {
     "slab": Channel("1", "index of the slab in each slot of the window, from chainage 0"),
     "largest_pressure": Channel("Pa", "largest pressure of the mortar under the slab, dead weight included"),
     "smallest_pressure": Channel("Pa", "smallest pressure of the mortar under the slab, dead weight included"),
 }
-"""Dimensions (time, slot); the slabs in the window, each in the slot of its index modulo the number of slots."""
+"""Of the slabs in the window, each in the slot given by its index modulo the number of slots."""
 
 SEATS = {
     "largest_vertical_force": Channel("N", "largest vertical force of the rail on the fastening, positive down"),
@@ -76,39 +73,38 @@ SEATS = {
     "smallest_lateral_force": Channel("N", "smallest lateral force of the rail on the fastening"),
     "factor": Channel("1", "factor of the defects on the fastening's stiffness, 1 sound, 0 failed"),
 }
-"""Dimensions (seat, side); extremes over every time step."""
+"""Extremes over all time steps."""
 
 SLABS = {
     "largest_pressure": Channel("Pa", "largest pressure of the mortar, dead weight included"),
     "smallest_pressure": Channel("Pa", "smallest pressure of the mortar, dead weight included"),
-    "largest_deflection": Channel("m", "largest deflection of the slab, positive down, from rest under its weight"),
+    "largest_deflection": Channel("m", "largest deflection of the slab beyond its own weight, positive down"),
     "smallest_deflection": Channel("m", "smallest deflection of the slab"),
-    "largest_moment_x": Channel("N m/m", "largest bending moment along the track, positive with tension underneath"),
+    "largest_moment_x": Channel("N m/m", "largest bending moment along the track, positive with tension below"),
     "smallest_moment_x": Channel("N m/m", "smallest bending moment along the track"),
-    "largest_moment_y": Channel("N m/m", "largest bending moment across the track, positive with tension underneath"),
+    "largest_moment_y": Channel("N m/m", "largest bending moment across the track, positive with tension below"),
     "smallest_moment_y": Channel("N m/m", "smallest bending moment across the track"),
-    "mortar_factor": Channel("1", "smallest factor of the voids under the slab on its bed, 1 without"),
+    "mortar_factor": Channel("1", "smallest factor of the voids under the slab on its bed, 1 without voids"),
 }
-"""Dimensions (slab,); extremes over the slab and over the bodies' samples."""
+"""Extremes over the area of the slab and over the samples of the bodies."""
 
 DEFLECTION = {
     "rail": Channel("m", "vertical deflection of the rail, positive down"),
-    "slab": Channel("m", "vertical deflection of the slab under the rail, positive down; not a number over joints"),
+    "slab": Channel("m", "vertical deflection of the slab under the rail, positive down; NaN over joints"),
 }
-"""Dimensions (time, side, point)."""
 
 GAUGE_MOTION = {
-    "displacement": Channel("m", "displacement of the place: y right, z down"),
-    "velocity": Channel("m/s", "velocity of the place: y right, z down"),
-    "acceleration": Channel("m/s^2", "acceleration of the place: y right, z down"),
+    "displacement": Channel("m", "displacement at the gauge: y right, z down"),
+    "velocity": Channel("m/s", "velocity at the gauge: y right, z down"),
+    "acceleration": Channel("m/s^2", "acceleration at the gauge: y right, z down"),
 }
-"""Of a gauge on rail or slab; dimensions (time, direction)."""
+"""Of a gauge on a rail or a slab."""
 
 GAUGE_FORCE = {
     "vertical_force": Channel("N", "vertical force of the rail on the fastening, positive down"),
     "lateral_force": Channel("N", "lateral force of the rail on the fastening, positive to the right"),
 }
-"""Of a gauge on a fastening; dimensions (time,)."""
+"""Of a gauge on a fastening."""
 
 GROUPS = {
     "wheel": WHEEL,

@@ -1,8 +1,8 @@
-"""What a run needs to go on with the same bits: the state of the trains of one task between two chunks of steps.
+"""Checkpoints: state of the trains of one task between two chunks of steps, from which a run resumes bit for bit.
 
-A checkpoint is a small file beside the result, one a task, put in place by an atomic rename: a SHA-256 digest, then an
-npz archive of plain arrays and one text of facts (JSON). Nothing in it is ever executed. The track needs no place in
-it: irregularity is a function of seed and chainage.
+A checkpoint is a small file next to the result file, one per task, put in place by an atomic rename: a SHA-256 digest
+followed by an npz archive of plain arrays and one JSON text of scalar values. Its contents are never executed. The
+track is not stored: the irregularity is a function of seed and chainage.
 """
 
 from __future__ import annotations
@@ -33,24 +33,24 @@ DIGEST = hashlib.sha256().digest_size
 VERSION = 1
 FACTS = "facts"
 NUMBERS = {"done": int, "position": float, "loop": float, "speed": float, "first_seat": int, "first_slab": int}
-"""Facts that are one number, by its type; none is below zero."""
+"""Numeric facts and their types; all are non-negative."""
 
 MAKERS = ("tiengine", "numpy", "scipy", "taichi")
-"""Packages whose version may change the bits of a run."""
+"""Packages whose versions can change the bits of a run."""
 
 
 def checkpoint_path(result: Path, task: int) -> Path:
-    """Where the checkpoint of a task lies.
+    """Path of the checkpoint of a task.
 
     Args:
-        result: The result file.
+        result: Result file.
         task: Number of the task.
     """
     return result.with_name(f".{result.name}.{task:04d}.checkpoint")
 
 
 def checkpoint_paths(result: Path) -> list[Path]:
-    """Checkpoints that lie beside a result."""
+    """Paths of the existing checkpoints of a result file."""
     prefix, suffix = f".{result.name}.", ".checkpoint"
     return sorted(
         path
@@ -63,12 +63,12 @@ def checkpoint_paths(result: Path) -> list[Path]:
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """The trains of a task between two chunks.
+    """State of the trains of a task between two chunks of steps.
 
     Attributes:
-        task: Its number.
-        facts: Plain values: steps done, speed at the last factorisation, samples written, ...
-        arrays: State, by name.
+        task: Number of the task.
+        facts: Scalar values: completed steps, speed at the last factorisation, samples written, ...
+        arrays: State arrays by name.
     """
 
     task: int
@@ -76,13 +76,13 @@ class Checkpoint:
     arrays: Mapping[str, NDArray[Any]]
 
     def write(self, result: Path) -> None:
-        """Put the checkpoint beside a result, in place of the one before it.
+        """Write the checkpoint next to a result file, replacing the previous one.
 
         Args:
-            result: The result file.
+            result: Result file.
 
         Raises:
-            OSError: The disk is full or gone; the checkpoint before it stays.
+            OSError: The disk is full or has failed; the previous checkpoint is kept.
         """
         made_by = {package: metadata.version(package) for package in MAKERS}
         text = json.dumps({"version": VERSION, "made_by": made_by, "task": self.task, **self.facts})
@@ -96,10 +96,10 @@ class Checkpoint:
         """Read a checkpoint.
 
         Args:
-            path: The file.
+            path: Checkpoint file.
 
         Raises:
-            InputError: It is damaged, or of another format.
+            InputError: The file is damaged or has another format.
         """
         where = str(path)
         check_regular(path, where, LARGEST_CHECKPOINT)
@@ -110,34 +110,35 @@ class Checkpoint:
                 if any(member.compress_type != zipfile.ZIP_STORED for member in members):
                     raise ValueError("compressed")
                 if sum(member.file_size for member in members) > len(archived):
-                    raise ValueError("claims to hold more than it has bytes")
+                    raise ValueError("declares more data than the file holds")
                 arrays = {member.filename.removesuffix(".npy"): _array(archive, member) for member in members}
             facts = json.loads(arrays.pop(FACTS).tobytes())
             version, task = facts["version"], int(facts["task"])
-        except Exception as error:  # zipfile, numpy and json raise some fifteen kinds
+        except Exception as error:  # zipfile, numpy and json raise about fifteen types
             raise InputError(
                 f"{where}: not a checkpoint, or damaged ({error or type(error).__name__});"
-                " remove it to run its trains anew"
+                " remove it to run its trains from the beginning"
             ) from None
         if version != VERSION:
             raise InputError(
-                f"{path}: checkpoint version = {version}: this program reads {VERSION}; remove it to run anew"
+                f"{path}: checkpoint version = {version}: this program reads {VERSION}; remove it to run its"
+                " trains from the beginning"
             )
         return cls(task, facts, arrays)
 
     def check(self, where: str) -> None:
-        """Refuse facts with which no run can go on.
+        """Refuse values from which no run can resume.
 
         Args:
-            where: Name of the file.
+            where: Name of the file, for messages.
 
         Raises:
-            InputError: Names the fact.
+            InputError: A value is missing or out of range; the message names it.
         """
         for name, kind in NUMBERS.items():
             value: Any = self.facts.get(name)
-            plain = type(value) is int or (kind is float and type(value) is float)
-            if not plain or not 0 <= value < 2**63:
+            is_number = type(value) is int or (kind is float and type(value) is float)
+            if not is_number or not 0 <= value < 2**63:
                 rule = f"must be a {'whole ' * (kind is int)}number >= 0"
                 raise InputError(f"{where}: damaged: {name} = {str(value)[:80]}: {rule}")
         rows = self.facts.get("rows")
@@ -146,39 +147,39 @@ class Checkpoint:
 
     @property
     def foreign(self) -> list[str]:
-        """Packages of other versions than those that made it: the bits may differ."""
+        """Packages whose versions differ from those that wrote the checkpoint: the bits may differ."""
         made_by = self.facts.get("made_by", {})
         return [f"{name} {made_by.get(name)}" for name in MAKERS if made_by.get(name) != metadata.version(name)]
 
 
 def sealed(archived: bytes) -> bytes:
-    """An archive with its digest before it: a zip file's own checksums do not cover its directory.
+    """Archive preceded by its digest, because the checksums of a zip file do not cover its directory.
 
     Args:
-        archived: The npz archive.
+        archived: Bytes of the npz archive.
     """
     return MAGIC + hashlib.sha256(archived).digest() + archived
 
 
 def _unsealed(content: bytes) -> bytes:
-    """The archive.
+    """Archive without its digest.
 
     Raises:
-        ValueError: It is not what was sealed.
+        ValueError: The digest does not match.
     """
     start = len(MAGIC) + DIGEST
     if not content.startswith(MAGIC):
-        raise ValueError("does not begin as one")
+        raise ValueError("no checkpoint header")
     if hashlib.sha256(content[start:]).digest() != content[len(MAGIC) : start]:
-        raise ValueError("digest")
+        raise ValueError("digest does not match")
     return content[start:]
 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
-    """One array, if it is no larger than what the file holds of it.
+    """Read one array, after comparing its declared size with the bytes that the file holds.
 
     Raises:
-        ValueError: It claims to be, or is no plain array.
+        ValueError: The declared size is larger, or the array holds objects.
     """
     with archive.open(member) as file:
         major = np.lib.format.read_magic(file)

@@ -1,4 +1,4 @@
-"""What can happen to a train on its way, and what the scenario makes of it."""
+"""Events that can occur to a train during a run."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ EVENT_KINDS = ("derailment", "flange_climb", "wheel_lift", "oscillation", "track
 
 
 class Event(NamedTuple):
-    """Something that happened to a train.
+    """Event of one train.
 
     Attributes:
         kind: One of ``EVENT_KINDS``, or ``"runaway"``.
-        time: When [s].
+        time: Time [s].
         position: Chainage of the first vehicle's centre [m].
-        wheelset: From 1; 0 where it concerns none.
-        side: ``"left"``, ``"right"``, or nothing.
-        words: What happened.
-        stops: Whether it ends the train.
+        wheelset: Number from 1; 0 if the event concerns no wheelset.
+        side: ``"left"``, ``"right"`` or empty.
+        words: Description.
+        stops: Whether the event ends the run of the train.
     """
 
     kind: str
@@ -31,5 +31,5 @@ class Event(NamedTuple):
     stops: bool
 
     def __str__(self) -> str:
-        """One sentence."""
+        """Description with time and chainage."""
         return f"{self.words} (t = {self.time:.4f} s, chainage {self.position:.2f} m)"

@@ -1,7 +1,7 @@
-"""Results in other programs' files: CSV, Parquet, MATLAB.
+"""Export of results to CSV, Parquet and MATLAB files.
 
-CSV and Parquet are written piece by piece, so that the length of a run does not matter. MATLAB's format of version 5
-is written at once and holds less than 2 GB; MATLAB reads the result file itself by ``h5read``, however long.
+CSV and Parquet files are written in pieces, so that memory does not grow with the length of a run. A MATLAB file of
+version 5 is written at once and holds less than 2 GB; for longer runs MATLAB reads the result file by ``h5read``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from tiengine.parameters.errors import InputError
-from tiengine.result_files.channel_table import ChannelTable, channel_table, chosen
+from tiengine.result_files.channel_table import ChannelTable, channel_table, select_channels
 from tiengine.result_files.output_file import check_output
 
 if TYPE_CHECKING:
@@ -26,31 +26,36 @@ if TYPE_CHECKING:
 
 __all__ = ["export"]
 
-CSV_VALUES = 100_000  # numbers in memory at a time: 13 MB as texts
-PARQUET_VALUES = 1_000_000  # a row group of at most 8 MB
-MAT_BYTES = 2**31 - 1  # of a file of version 5
-MAT_NAME = 63  # longest name in MATLAB
+CSV_VALUES = 100_000  # values in memory at once: 13 MB as strings
+PARQUET_VALUES = 1_000_000  # values in a row group: at most 8 MB
+MAT_BYTES = 2**31 - 1  # limit of a file of version 5
+MAT_NAME = 63  # characters of the longest name in MATLAB
+MAT_KEYWORDS = frozenset({
+    "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if",
+    "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
+})  # fmt: skip
+"""Reserved words of MATLAB: no name may be one of them."""
 
 
 def export(
     result: Reader, path: Path | str, *, train: int = 0, channels: Sequence[str] = (), force: bool = False
 ) -> str:
-    """Write channels of one train into a file whose suffix says the format.
+    """Write channels of one train to a file; its suffix selects the format.
 
     Args:
         result: Open result.
-        path: ``.csv``, ``.parquet`` or ``.mat``.
+        path: File to write, ending in ``.csv``, ``.parquet`` or ``.mat``.
         train: Index of the train.
-        channels: Groups or channels, ``"body"``, ``"wheel/vertical_force"``; the wheels' if empty. CSV and Parquet take
-            channels that are sampled together.
+        channels: Groups or channels, for example ``"body"`` or ``"wheel/vertical_force"``; the group ``wheel`` if
+            empty. In CSV and Parquet files all channels must be sampled together.
         force: Replace an existing file.
 
     Returns:
-        What was written, in words.
+        Description of the contents, such as ``300 rows of 10 columns``.
 
     Raises:
-        InputError: No such train or channel, channels that do not fit one table, a package that is missing, a file
-            that is there already or cannot be written.
+        InputError: There is no such train or channel, the channels do not fit one table, a package is missing, or the
+            file exists already or cannot be written.
     """
     path = Path(path)
     if path.suffix not in _FORMATS:
@@ -65,7 +70,7 @@ def _write_csv(result: Reader, path: Path, train: int, channels: Sequence[str]) 
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(column.heading for column in table.columns)
         for piece in table.pieces(CSV_VALUES):
-            texts = [column.astype(str) for column in piece]  # the shortest that reads back the same
+            texts = [column.astype(str) for column in piece]  # shortest decimal that reads back to the same number
             writer.writerows(zip(*texts, strict=True))
     return _size(table)
 
@@ -93,12 +98,12 @@ def _write_parquet(result: Reader, path: Path, train: int, channels: Sequence[st
 def _write_mat(result: Reader, path: Path, train: int, channels: Sequence[str]) -> str:
     from scipy.io import savemat
 
-    found = chosen(result, train, channels)
+    found = select_channels(result, train, channels)
     size = sum(dataset.nbytes for dataset in found.values())
     if size > MAT_BYTES:
         raise InputError(
-            f"output = '{path}': {size / 1e9:.1f} GB, and MATLAB's files of version 5 hold less than 2 GB; choose fewer"
-            f" channels, or read {result.name} in MATLAB by h5read (its version 7.3 is HDF5 as well)"
+            f"output = '{path}': {size / 1e9:.1f} GB: a MATLAB file of version 5 holds less than 2 GB; choose fewer"
+            f" channels, or read {result.name} in MATLAB by h5read"
         )
     content: dict[str, Any] = {"facts": _facts(result, train)}
     structs: dict[str, dict[str, Any]] = {"": content}
@@ -118,12 +123,12 @@ _FORMATS: dict[str, Callable[[Reader, Path, int, Sequence[str]], str]] = {
 
 
 def _struct(structs: dict[str, dict[str, Any]], path: str, group: Any) -> dict[str, Any]:
-    """The MATLAB structure of a group, with its coordinates; made at the first call.
+    """MATLAB structure of a group, with its coordinates; created at the first call.
 
     Args:
-        structs: Those made so far, by path.
-        path: Of the group within the train.
-        group: Of the file.
+        structs: Structures created so far, by path.
+        path: Path of the group within the train.
+        group: HDF5 group.
     """
     if path not in structs:
         above, _, name = path.rpartition("/")
@@ -136,7 +141,7 @@ def _struct(structs: dict[str, dict[str, Any]], path: str, group: Any) -> dict[s
 
 
 def _add(struct: dict[str, Any], name: str, dataset: Any) -> None:
-    """A dataset and its unit to a MATLAB structure; texts become a cell array."""
+    """Add a dataset and its unit to a MATLAB structure; strings become a cell array."""
     is_text = h5py.check_string_dtype(dataset.dtype)
     key = _matlab_name(name, struct)
     struct[key] = np.array(dataset.asstr()[:], dtype=object) if is_text else dataset[()]
@@ -144,7 +149,7 @@ def _add(struct: dict[str, Any], name: str, dataset: Any) -> None:
 
 
 def _facts(result: Reader, train: int) -> dict[str, Any]:
-    """Whence the numbers come: file, train, scenario and the train's own attributes."""
+    """Origin of the data: file, train, scenario and the attributes of the train."""
     own: dict[str, Any] = {}
     for name, value in result.facts(train).items():
         is_texts = isinstance(value, list) and all(isinstance(item, str) for item in value)
@@ -153,9 +158,10 @@ def _facts(result: Reader, train: int) -> dict[str, Any]:
 
 
 def _matlab_name(name: str, taken: dict[str, Any]) -> str:
-    """The name as MATLAB accepts it: letters, digits and underscores, a letter first, not too long, not taken."""
+    """Valid and unused MATLAB name: letters, digits and underscores, beginning with a letter, no reserved word."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
-    plain = (plain if plain[:1].isalpha() else f"x{plain}")[:MAT_NAME]
+    is_name = plain[:1].isalpha() and plain not in MAT_KEYWORDS
+    plain = (plain if is_name else f"x{plain}")[:MAT_NAME]
     stem, count = plain[: MAT_NAME - 4], 2
     while plain in taken:
         plain, count = f"{stem}_{count}", count + 1
@@ -167,7 +173,7 @@ def _described(unit: str, long_name: str) -> dict[str, str]:
 
 
 def _width(dataset: Any) -> int:
-    """Columns that a dataset is cut into."""
+    """Number of columns of a dataset."""
     return int(np.prod(dataset.shape[1:], dtype=np.int64))
 
 
@@ -177,7 +183,7 @@ def _size(table: ChannelTable) -> str:
 
 @contextmanager
 def _replacing(path: Path) -> Iterator[Path]:
-    """A temporary file that gets its name when it is complete, and goes if it is not."""
+    """Temporary file that is renamed to its final name when complete, and removed otherwise."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         yield temporary

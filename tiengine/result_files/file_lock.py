@@ -1,7 +1,7 @@
-"""One writer at a time for a result file, and what a writer that died has left beside it.
+"""Lock of a result file: one writer at a time, and clean-up after writers that were killed.
 
-A writer holds a lock beside the file, which the system frees when the process dies. Whoever holds it may complete a
-commit that a crash interrupted and remove temporary files.
+A writer holds a lock file next to the result file; the system releases the lock when the process ends. The holder of
+the lock may complete an interrupted commit and remove temporary files.
 """
 
 from __future__ import annotations
@@ -16,38 +16,38 @@ from filelock import FileLock, Timeout
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.journal import journal_of, recover
 
-__all__ = ["locked", "release", "settle", "sweep"]
+__all__ = ["acquire_lock", "complete_commit", "release_lock", "remove_temporary_files"]
 
 PATIENCE = 2.0
-"""How long a reader waits for a commit under way [s]; it takes some 20 ms."""
+"""Time for which a reader waits for a commit in progress [s]; a commit takes about 20 ms."""
 
 
-def locked(path: Path) -> FileLock:
-    """The lock on a result.
+def acquire_lock(path: Path) -> FileLock:
+    """Acquire the lock of a result file.
 
     Args:
-        path: The result.
+        path: Result file.
 
     Raises:
-        InputError: Another run holds it, or the folder cannot be written to.
+        InputError: Another run holds the lock, or the folder is not writable.
     """
     lock = _lock_of(path)
     try:
         lock.acquire()
     except Timeout:
-        if not Path(lock.lock_file).exists():  # filelock tries again where nothing can be made, /proc for example
-            raise InputError(f"output = '{path}': cannot be written (no lock can be made beside it)") from None
+        if not Path(lock.lock_file).exists():  # filelock also times out in /proc, for example
+            raise InputError(f"output = '{path}': cannot be written (no lock file can be created next to it)") from None
         raise InputError(f"output = '{path}': another run is writing it") from None
     except OSError as error:
         raise InputError(f"output = '{path}': cannot be written ({error})") from None
     return lock
 
 
-def release(lock: FileLock | None) -> None:
-    """Let others write, and leave no lock file behind.
+def release_lock(lock: FileLock | None) -> None:
+    """Release a lock and remove its file.
 
     Args:
-        lock: As from :func:`locked`; None does nothing.
+        lock: Lock from :func:`acquire_lock`, or None.
     """
     if lock is not None:
         with suppress(OSError):
@@ -55,18 +55,18 @@ def release(lock: FileLock | None) -> None:
         lock.release()
 
 
-def settle(path: Path) -> None:
-    """Bring a file that is about to be read to its last commit: complete it if its writer died, else wait for it.
+def complete_commit(path: Path) -> None:
+    """Bring a file to its last commit before it is read: complete that of a killed writer, or wait for a live one.
 
     Args:
-        path: The result; nothing happens where the folder cannot be written to.
+        path: Result file; left as it is if the folder is not writable.
     """
     deadline = time.monotonic() + PATIENCE
     while journal_of(path).exists() and time.monotonic() < deadline:
         lock = _lock_of(path)
         try:
             lock.acquire()
-        except Timeout:  # a commit is under way
+        except Timeout:  # a commit is in progress
             time.sleep(0.01)
             continue
         except OSError:
@@ -76,14 +76,14 @@ def settle(path: Path) -> None:
                 recover(path)
             return
         finally:
-            release(lock)
+            release_lock(lock)
 
 
-def sweep(path: Path) -> None:
-    """Remove temporary files of writers that died. Only for who holds the lock.
+def remove_temporary_files(path: Path) -> None:
+    """Remove temporary files of killed writers; the caller must hold the lock.
 
     Args:
-        path: The result.
+        path: Result file.
     """
     name = re.escape(path.name)
     part = re.compile(rf"\.({name}|{name}\.journal|\.{name}\.\d+\.checkpoint)\.\d+\.part")

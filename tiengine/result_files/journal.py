@@ -1,12 +1,12 @@
-"""A file that changes only by whole commits, whatever happens in between.
+"""File that changes only by whole commits, even if the process is killed.
 
-HDF5 changes its metadata in place and in no particular order, so that a process killed on its way leaves a file that
-may not open. Here, bytes behind the last commit's end go straight to the file, where nothing refers to them yet; pages
-before it are held in memory. A commit writes these pages to a journal, puts the journal in place by an atomic rename,
-brings the file up to date and removes the journal. So the file is as of the last commit at any instant but the
-millisecond in which pages are brought up to date, and for that instant there is the journal (:func:`recover`).
+HDF5 changes its metadata in place and in no particular order, so that a killed process may leave a file that does not
+open. Here, bytes beyond the end of the last commit are written to the file at once, where nothing refers to them yet;
+changed pages before that end are held in memory. A commit writes these pages to a journal, puts the journal in place by
+an atomic rename, updates the file and removes the journal. The file therefore always holds the last commit, except for
+the millisecond in which its pages are updated; for that time the journal exists (:func:`recover`).
 
-Data reach the disk (fsync) before what refers to them does; a power cut is as harmless as a kill.
+Data are flushed to the disk (fsync) before anything refers to them, which also covers a power cut.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ PLACE = struct.Struct("<QI")  # offset and length of a page
 
 
 def journal_of(path: Path) -> Path:
-    """Where the journal of a file is while a commit is under way."""
+    """Path of the journal of a file, which exists while a commit is in progress."""
     return path.with_name(f"{path.name}.journal")
 
 
 class JournalledFile(io.RawIOBase):
-    """A binary file for h5py's ``fileobj`` driver; see the module.
+    """Binary file for the ``fileobj`` driver of h5py; see the module.
 
     Attributes:
-        path: Where it is; may be changed after the file was moved.
+        path: Path of the file; to be changed when the file is renamed.
     """
 
     def __init__(self, path: Path, *, fresh: bool) -> None:
-        """Open.
+        """Open the file.
 
         Args:
-            path: The file.
-            fresh: Create an empty one; else continue one that :func:`recover` has seen.
+            path: Path of the file.
+            fresh: Create an empty file; otherwise continue one after :func:`recover`.
 
         Raises:
-            OSError: It cannot be opened for writing.
+            OSError: The file cannot be opened for writing.
         """
         super().__init__()
         self.path = path
@@ -58,29 +58,29 @@ class JournalledFile(io.RawIOBase):
         self._abandoned = False
 
     def readable(self) -> bool:
-        """Yes."""
+        """Return True; see :meth:`io.IOBase.readable`."""
         return True
 
     def writable(self) -> bool:
-        """Yes."""
+        """Return True; see :meth:`io.IOBase.writable`."""
         return True
 
     def seekable(self) -> bool:
-        """Yes."""
+        """Return True; see :meth:`io.IOBase.seekable`."""
         return True
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Go to a place; see :meth:`io.IOBase.seek`."""
+        """Set the position; see :meth:`io.IOBase.seek`."""
         base = {os.SEEK_SET: 0, os.SEEK_CUR: self._position, os.SEEK_END: self._size}[whence]
         self._position = base + offset
         return self._position
 
     def tell(self) -> int:
-        """Where the next byte is read or written."""
+        """Position of the next byte to be read or written."""
         return self._position
 
     def readinto(self, buffer: Any) -> int:
-        """Read, changes that are not committed included."""
+        """Read bytes, including changes that are not committed yet."""
         view = memoryview(buffer).cast("B")
         start = self._position
         count = max(min(len(view), self._size - start), 0)
@@ -93,7 +93,7 @@ class JournalledFile(io.RawIOBase):
         return count
 
     def write(self, data: Any) -> int:
-        """Write: behind the committed end at once, else into pages for the next commit."""
+        """Write bytes: directly beyond the committed end, otherwise into pages for the next commit."""
         view = memoryview(data).cast("B")
         if self._abandoned:
             self._position += len(view)
@@ -110,7 +110,7 @@ class JournalledFile(io.RawIOBase):
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the size; what was committed stays until the next commit."""
+        """Set the size; committed bytes are kept until the next commit."""
         if self._abandoned:
             return self._size
         self._size = self._position if size is None else size
@@ -119,16 +119,16 @@ class JournalledFile(io.RawIOBase):
         return self._size
 
     def commit(self) -> None:
-        """Make everything written so far permanent.
+        """Make all bytes written so far permanent.
 
         Raises:
-            OSError: The disk is full or gone; the file is as of the last commit, or the journal holds what is missing.
+            OSError: The disk is full or has failed; the file holds the last commit, or the journal completes this one.
         """
         os.fsync(self._file.fileno())
         if self._pages or self._size < self._committed:
             journal = journal_of(self.path)
             starts = {page * PAGE: content for page, content in sorted(self._pages.items())}
-            # of the page that the committed end divides, the rest has been written already
+            # the last page extends beyond the committed end: that part has been written to the file already
             pages = [(start, content[: self._committed - start]) for start, content in starts.items()]
             atomic_write(journal, _journal(self._size, pages))
             _apply(self._file, self._size, pages)
@@ -137,17 +137,17 @@ class JournalledFile(io.RawIOBase):
         self._committed = self._size
 
     def abandon(self) -> None:
-        """Take no more changes: for HDF5, which writes once more when it closes, on a disk that may be full."""
+        """Discard all further changes: HDF5 writes again when it closes, and the disk may be full."""
         self._abandoned = True
 
     def close(self) -> None:
-        """Close; what was not committed is dropped (bytes behind the committed end are harmless)."""
+        """Close the file; uncommitted changes are dropped (bytes beyond the committed end are harmless)."""
         if not self.closed:
             self._file.close()
         super().close()
 
     def _page(self, page: int) -> bytearray:
-        """The page to change, as the file has it until then."""
+        """Page held in memory, read from the file at its first change."""
         if page not in self._pages:
             content = bytearray(PAGE)
             _read_at(self._file, page * PAGE, memoryview(content))
@@ -156,13 +156,13 @@ class JournalledFile(io.RawIOBase):
 
 
 def recover(path: Path) -> bool:
-    """Complete a commit that a crash interrupted. Only for who holds the file's lock.
+    """Complete an interrupted commit; the caller must hold the lock of the file.
 
     Args:
-        path: The file.
+        path: Path of the file.
 
     Returns:
-        Whether there was one.
+        Whether there was an interrupted commit.
 
     Raises:
         OSError: The file cannot be written.
@@ -175,9 +175,9 @@ def recover(path: Path) -> bool:
         size, pages = _read_journal(content)
     except ValueError:
         if content.startswith(MAGIC) or not any(content):
-            # the rename reached the disk before the contents: the file itself was not touched yet
+            # the rename reached the disk before the contents: the file itself has not been changed yet
             journal.unlink()
-        return False  # something else of that name is left alone
+        return False  # a file of another kind is not touched
     with path.open("r+b", buffering=0) as file:
         _apply(file, size, pages)
     journal.unlink()
@@ -185,14 +185,14 @@ def recover(path: Path) -> bool:
 
 
 def atomic_write(path: Path, content: bytes) -> None:
-    """Write a whole file, or leave what is there.
+    """Write a whole file, or leave the existing one unchanged.
 
     Args:
-        path: The file.
-        content: All of it.
+        path: Path of the file.
+        content: Complete contents.
 
     Raises:
-        OSError: It cannot be written.
+        OSError: The file cannot be written.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -208,15 +208,15 @@ def atomic_write(path: Path, content: bytes) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Put names that were given in a folder onto the disk.
+    """Flush new names in a folder to the disk.
 
     Args:
-        path: The folder.
+        path: Path of the folder.
 
     Raises:
-        OSError: The disk is gone.
+        OSError: The disk has failed.
     """
-    if hasattr(os, "O_DIRECTORY"):  # Windows has no such call
+    if hasattr(os, "O_DIRECTORY"):  # not available on Windows
         folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
         try:
             os.fsync(folder)
@@ -225,7 +225,7 @@ def sync_folder(path: Path) -> None:
 
 
 def _parts(start: int, end: int) -> Iterator[tuple[int, int, int]]:
-    """Pages under a stretch of bytes: number, first and last byte in the page."""
+    """Pages that cover a range of bytes: number, first and last byte within the page."""
     for page in range(start // PAGE, (end + PAGE - 1) // PAGE):
         first, last = max(start - page * PAGE, 0), min(end - page * PAGE, PAGE)
         if first < last:
@@ -233,7 +233,7 @@ def _parts(start: int, end: int) -> Iterator[tuple[int, int, int]]:
 
 
 def _read_at(file: BinaryIO, offset: int, into: memoryview) -> None:
-    """Fill ``into`` as far as the file goes."""
+    """Fill ``into`` up to the end of the file."""
     file.seek(offset)
     done = 0
     while done < len(into):
@@ -251,14 +251,14 @@ def _write_at(file: BinaryIO, offset: int, data: memoryview | bytearray) -> None
 
 
 def _journal(size: int, pages: list[tuple[int, bytearray]]) -> bytes:
-    """A journal's bytes; pages are cut at the file's end."""
+    """Contents of a journal; pages are cut at the end of the file."""
     kept = [(offset, page[: size - offset]) for offset, page in pages if offset < size]
     body = b"".join(PLACE.pack(offset, len(page)) + page for offset, page in kept)
     return MAGIC + HEADER.pack(size, len(kept), zlib.crc32(body)) + body
 
 
 def _read_journal(content: bytes) -> tuple[int, list[tuple[int, bytearray]]]:
-    """Size of the file and pages.
+    """Read the size of the file and the pages from a journal.
 
     Raises:
         ValueError: The journal is damaged.
@@ -279,7 +279,7 @@ def _read_journal(content: bytes) -> tuple[int, list[tuple[int, bytearray]]]:
 
 
 def _apply(file: BinaryIO, size: int, pages: list[tuple[int, bytearray]]) -> None:
-    """Bring the file up to date and onto the disk."""
+    """Write the pages to the file, set its size and flush it to the disk."""
     for offset, page in pages:
         if offset < size:
             _write_at(file, offset, page[: size - offset])

@@ -1,8 +1,8 @@
-"""The life of a result file: created, locked, committed now and then, completed; or continued after a crash.
+"""Life cycle of a result file: created and locked, committed repeatedly, completed; or continued after a crash.
 
-The file has its name from its first commit on, so that it can be read while the run goes on, and what was committed
-survives whatever happens to the process (:mod:`tiengine.result_files.journal`). While it replaces an older
-file (``force``), it gets its name only once it holds something.
+The file has its final name from the first commit on, so that it can be read during the run, and committed data survive
+a crash of the process (:mod:`tiengine.result_files.journal`). If it replaces an older file (``force``), it is renamed
+at the first commit after the header.
 """
 
 from __future__ import annotations
@@ -23,49 +23,49 @@ from filelock import FileLock
 
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.checkpoint import checkpoint_paths
-from tiengine.result_files.file_lock import locked, release, sweep
+from tiengine.result_files.file_lock import acquire_lock, release_lock, remove_temporary_files
 from tiengine.result_files.journal import JournalledFile, journal_of, recover, sync_folder
 from tiengine.result_files.reader import COMPLETE, FORMAT, FORMAT_VERSION, RUNNING, Reader, open_reader
 
 __all__ = ["OutputFile", "check_output", "header"]
 
 LIBRARY = ("v110", "v110")
-"""File format of HDF5 1.10: the first whose own structures carry checksums, so that a damaged file is found out."""
+"""File format of HDF5 1.10, the first whose metadata carry checksums, so that damage is detected."""
 
 DISK_ERRORS = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS") if hasattr(errno, name)}
-"""What the system says when a disk is full or gone."""
+"""Error numbers of the system for a disk that is full or has failed."""
 
 PACKAGES = ("numpy", "scipy", "taichi", "h5py", "pydantic")
 
 
 def check_output(path: Path, force: bool = False) -> None:
-    """Refuse a path that cannot become a result file, before anything is computed.
+    """Refuse a path that cannot become a result file, before the computation.
 
     Args:
-        path: Where the file shall be.
+        path: Path of the new file.
         force: Whether an existing file may be replaced.
 
     Raises:
-        InputError: The path is a folder, exists already, or lies in no folder that can be written.
+        InputError: The path is a folder or exists already, or its folder is missing or not writable.
     """
     try:
         if path.is_dir():
             raise InputError(f"output = '{path}': must be a file, not a folder")
         if path.exists() and not path.is_file():
             raise InputError(f"output = '{path}': must be a regular file, not a device or a pipe")
-    except (OSError, ValueError) as error:  # a name that no file can have
+    except (OSError, ValueError) as error:  # not a valid file name
         if isinstance(error, InputError):
             raise
         raise InputError(f"output = '{path}': cannot be written ({error})") from None
     if path.exists() and not force:
         how = "choose another name or --force"
         if _is_unfinished(path):
-            how = f"it is an unfinished run: continue it by `tiengine resume {path}`, or {how}"
+            how = f"it is an unfinished run: resume it with `tiengine resume {path}`, or {how}"
         raise InputError(f"output = '{path}': exists already; {how}")
     if not path.parent.is_dir():
         raise InputError(f"output = '{path}': there is no folder '{path.parent}'")
     if not os.access(path.parent, os.W_OK):
-        raise InputError(f"output = '{path}': the folder '{path.parent}' cannot be written to")
+        raise InputError(f"output = '{path}': the folder '{path.parent}' is not writable")
 
 
 def _is_unfinished(path: Path) -> bool:
@@ -77,88 +77,83 @@ def _is_unfinished(path: Path) -> bool:
 
 
 class OutputFile:
-    """A result file open for writing.
+    """Result file open for writing.
 
     Attributes:
-        path: Where it is or shall be; None in memory.
-        h5: The open HDF5 file.
+        path: Final path of the file; None for a file in memory.
+        h5: Open HDF5 file.
     """
 
     def __init__(self, path: Path | None, h5: Any, journalled: JournalledFile | None, lock: FileLock | None) -> None:
-        """See :meth:`create` and :meth:`resume`."""
+        """Take over open files; use :meth:`create` or :meth:`resume`."""
         self.path, self.h5 = path, h5
         self._journalled, self._lock = journalled, lock
         self._published = path is None or journalled is None or journalled.path == path
 
     @classmethod
     def create(cls, path: Path | None, force: bool) -> OutputFile:
-        """A new file.
+        """Create a file.
 
         Args:
-            path: Where it shall be; None keeps it in memory.
+            path: Path of the file; None keeps it in memory.
             force: Replace an existing file.
 
         Raises:
-            InputError: It cannot be written, or another run writes it.
+            InputError: The file cannot be written, or another run is writing it.
         """
         if path is None:
-            name = f"tiengine-{uuid.uuid4()}"  # HDF5 refuses two open files of one name, in memory too
+            name = f"tiengine-{uuid.uuid4()}"  # HDF5 refuses two open files with the same name, even in memory
             return cls(None, h5py.File(name, "w", driver="core", backing_store=False, rdcc_nbytes=0), None, None)
         check_output(path, force)
-        lock = locked(path)
+        lock = acquire_lock(path)
         part = path.with_name(f".{path.name}.{os.getpid()}.part")
         try:
-            sweep(path)
+            remove_temporary_files(path)
             if path.exists():
                 recover(path)
             else:
-                journal_of(path).unlink(missing_ok=True)  # of a file that was removed
+                journal_of(path).unlink(missing_ok=True)  # journal of a file that was removed
             journalled = JournalledFile(part, fresh=True)
             return cls(path, _opened(journalled, "w"), journalled, lock)
         except OSError as error:
-            release(lock)
+            release_lock(lock)
             raise InputError(f"output = '{path}': cannot be written ({error})") from None
 
     @classmethod
     def resume(cls, path: Path) -> OutputFile:
-        """A file that a run has left unfinished.
+        """Open the file of an unfinished run.
 
         Args:
-            path: The file.
+            path: Path of the file.
 
         Raises:
-            InputError: It is not an unfinished result, cannot be written, or another run writes it.
+            InputError: The file is not an unfinished result, cannot be written, or another run is writing it.
         """
-        with open_reader(path):  # says what is wrong with a foreign file, and touches none
+        with open_reader(path):  # refuses files of other programs before anything is written next to them
             pass
-        lock = locked(path)
+        lock = acquire_lock(path)
         try:
             recover(path)
-            sweep(path)
+            remove_temporary_files(path)
             with open_reader(path) as result:
                 if result.finished:
                     _remove_checkpoints(path)
-                    raise InputError(f"{path}: is complete; there is nothing to resume")
+                    raise InputError(f"{path}: the run is complete; there is nothing to resume")
                 result.check()
             journalled = JournalledFile(path, fresh=False)
             return cls(path, _opened(journalled, "r+"), journalled, lock)
         except OSError as error:
-            release(lock)
+            release_lock(lock)
             raise InputError(f"{path}: cannot be continued ({error})") from None
         except BaseException:
-            release(lock)
+            release_lock(lock)
             raise
 
-    @property
-    def exists(self) -> bool:
-        """Whether the file has its name."""
-        return self._published
-
     def commit(self) -> None:
-        """Make what was written permanent, under the file's own name.
+        """Make all written data permanent, under the final name of the file.
 
         Raises:
-            InputError: The disk is full or gone.
+            InputError: The disk is full or has failed.
         """
         if self._journalled is None or self.path is None:
             return
@@ -166,20 +161,20 @@ class OutputFile:
             self.h5.flush()
             self._journalled.commit()
             self._publish()
-        except (OSError, RuntimeError) as error:  # h5py says RuntimeError when the disk is full
+        except (OSError, RuntimeError) as error:  # h5py raises RuntimeError if the disk is full
             raise InputError(f"output = '{self.path}': cannot be written ({error})") from None
 
     def complete(self, attributes: Mapping[str, Any]) -> Reader:
-        """Write the last attributes and close.
+        """Write the final attributes and close the file.
 
         Args:
-            attributes: Of the root.
+            attributes: Attributes of the root.
 
         Returns:
             The result, open for reading.
 
         Raises:
-            InputError: The disk is full or gone.
+            InputError: The disk is full or has failed.
         """
         self.h5.attrs.update({"status": COMPLETE} | dict(attributes))
         if self._journalled is None or self.path is None:
@@ -192,14 +187,14 @@ class OutputFile:
             raise InputError(f"output = '{self.path}': cannot be completed ({error})") from None
         self._journalled.close()
         _remove_checkpoints(self.path)
-        release(self._lock)
+        release_lock(self._lock)
         return Reader(h5py.File(self.path, "r"), str(self.path))
 
     def leave(self, keep: bool) -> None:
-        """Close without completing.
+        """Close the file without completing it.
 
         Args:
-            keep: Leave the file as of its last commit; else remove it.
+            keep: Keep the file as of its last commit; otherwise remove it.
         """
         if self._journalled is None or self.path is None:
             self.h5.close()
@@ -212,10 +207,10 @@ class OutputFile:
             self._journalled.path.unlink(missing_ok=True)
         elif not keep:
             self.path.unlink(missing_ok=True)
-        release(self._lock)
+        release_lock(self._lock)
 
     def _publish(self) -> None:
-        """Give the file its name; checkpoints of the run that it replaces must never meet it."""
+        """Rename the file to its final name, after removing the checkpoints of the run that it replaces."""
         if self._published or self.path is None or self._journalled is None:
             return
         _remove_checkpoints(self.path)
@@ -225,10 +220,10 @@ class OutputFile:
 
 
 def header(scenario_toml: str) -> dict[str, Any]:
-    """Root attributes of every file.
+    """Root attributes of every result file.
 
     Args:
-        scenario_toml: Resolved scenario.
+        scenario_toml: Resolved scenario as TOML.
     """
     versions = {f"{package}_version": metadata.version(package) for package in PACKAGES}
     return {
@@ -245,7 +240,7 @@ def header(scenario_toml: str) -> dict[str, Any]:
 
 
 def _opened(journalled: JournalledFile, mode: str) -> Any:
-    """The HDF5 file; without a chunk cache, else every open dataset holds 1 MB."""
+    """Open the HDF5 file without a chunk cache, which would take 1 MB per open dataset."""
     try:
         return h5py.File(journalled, mode, rdcc_nbytes=0, libver=LIBRARY)
     except BaseException:
@@ -254,6 +249,6 @@ def _opened(journalled: JournalledFile, mode: str) -> Any:
 
 
 def _remove_checkpoints(path: Path) -> None:
-    """Of a run that is over."""
+    """Remove the checkpoints of a finished run."""
     for each in checkpoint_paths(path):
         each.unlink(missing_ok=True)

@@ -1,6 +1,6 @@
-"""Reading result files: lazily, as NumPy arrays.
+"""Reader of result files: lazy datasets of h5py or NumPy arrays.
 
-The files are plain HDF5; docs/results.md says what they hold, and how to read them without this package.
+The files are plain HDF5; docs/results.md describes them and how to read them without this package.
 """
 
 from __future__ import annotations
@@ -18,17 +18,19 @@ from numpy.typing import NDArray
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.input_files import is_file
 from tiengine.result_files.damage import check_train, readable, unreadable
-from tiengine.result_files.file_lock import settle
+from tiengine.result_files.file_lock import complete_commit
 from tiengine.result_files.journal import journal_of
 
 __all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "RUNNING", "Reader", "open_file", "open_reader"]
 
 FORMAT = "tiengine"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+"""Of the files that are written. In version 1 every train also had a dataset ``time``, that of its group ``wheel``."""
+READABLE_VERSIONS = (1, 2)
 COMPLETE = "complete"
-"""Status of a train that has run to the end of its way."""
+"""Status of a train that has run its whole distance."""
 RUNNING = "running"
-"""Status of one that is on its way, or was when the program ended."""
+"""Status of a train that is running, or was when the program ended."""
 TRAIN = re.compile(r"trains/\d+(?=/|$)", flags=re.ASCII)
 CHECKSUM = "scenario_crc32"
 LARGEST_SCENARIO = 100_000_000  # characters
@@ -38,46 +40,46 @@ OPTIONAL = {
     "deflection": "output.deflection_interval, 0.1 for example,",
     "gauges": "a table [[gauges]]",
 }
-"""Groups of a train that a run may do without, and what to set for them."""
+"""Groups of a train that are optional, and the key of the scenario that adds each."""
 
 
 class Reader:
-    """A result file, open for reading; use as a context manager or :meth:`close` it.
+    """Result file, open for reading; use as a context manager or :meth:`close` it.
 
     Attributes:
-        file: The open HDF5 file.
+        file: Open HDF5 file.
         name: Path of the file, for messages.
     """
 
     def __init__(self, file: Any, name: str) -> None:
-        """Take over an open file, as :func:`open_file` and the writer give it.
+        """Take over an open file from :func:`open_file` or a writer.
 
         Args:
-            file: The open HDF5 file.
-            name: Its path.
+            file: Open HDF5 file.
+            name: Path of the file, for messages.
         """
         self.file = file
         self.name = name
         self._checked: set[str] = set()
 
     def __enter__(self) -> Self:
-        """The result itself."""
+        """Return the result itself."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the file; what HDF5 could not read in it becomes an InputError."""
+        """Close the file; convert errors of HDF5 to InputError."""
         self.close()
         if (words := unreadable(error, trace)) is not None:
             raise InputError(f"{self.name}: {words}") from error
 
     def __getitem__(self, path: str) -> Any:
-        """A dataset or group, as in ``result["trains/000/wheel/normal_force"][:1000]``; nothing is read yet.
+        """Dataset or group, as in ``result["trains/000/wheel/normal_force"][:1000]``; data are read on indexing.
 
         Raises:
-            InputError: There is nothing at that path; the message names the nearest, or the key that fills it. Or the
-                train is damaged.
+            InputError: The path does not exist; the message names the nearest path, or the key of the scenario that
+                adds the group. Or the train is damaged.
         """
         with readable(self.name):
             return self._at(path)
@@ -119,41 +121,41 @@ class Reader:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Root attributes: versions, scenario, DOFs, step, wall times."""
+        """Root attributes: versions, scenario, degrees of freedom, time step, wall times."""
         with readable(self.name):
             return {key: _plain(value) for key, value in self.file.attrs.items()}
 
     @property
     def scenario_toml(self) -> str:
-        """The resolved scenario as text.
+        """Resolved scenario as TOML.
 
         Raises:
-            InputError: It is missing, damaged, or too large.
+            InputError: The text is missing, damaged, or too large.
         """
         with readable(self.name):
             text = str(self.file.attrs["scenario"])
-            has_checksum = CHECKSUM in set(self.file.attrs)  # "get" would take a damaged one for none
+            has_checksum = CHECKSUM in set(self.file.attrs)  # "get" would return None for a damaged one
             checksum = self.file.attrs[CHECKSUM] if has_checksum else None
         if len(text) > LARGEST_SCENARIO:
             raise InputError(
                 f"{self.name}: scenario: {len(text) / 1e6:g} MB, larger than {LARGEST_SCENARIO / 1e6:g} MB"
             )
         if checksum is not None and zlib.crc32(text.encode("utf-8", "surrogateescape")) != checksum:
-            raise InputError(f"{self.name}: scenario: damaged: its checksum is another one")
+            raise InputError(f"{self.name}: scenario: damaged: its checksum does not match")
         return text
 
     def check(self) -> None:
-        """Look at every train, as nothing else does before it is asked for.
+        """Check the structure of all trains, which is otherwise checked at the first access to each.
 
         Raises:
-            InputError: One is damaged.
+            InputError: A train is damaged.
         """
         with readable(self.name):
             for train in self._names:
                 self._at(f"trains/{train}")
 
     def status(self, train: int = 0) -> str:
-        """``"complete"``, or why the train failed.
+        """Status of a train: ``"complete"``, ``"running"``, or the reason of its failure.
 
         Args:
             train: Index of the train.
@@ -162,17 +164,17 @@ class Reader:
 
     @property
     def finished(self) -> bool:
-        """Whether the run has come to its end, well or not; one that has not can be resumed."""
+        """Whether the run has ended, successfully or not; an unfinished run can be resumed."""
         return bool(self.attributes.get("status") != RUNNING)
 
     @property
     def failures(self) -> dict[int, str]:
-        """Why trains failed, by their index."""
+        """Reasons of failure by the index of the train."""
         found = {train: self.status(train) for train in range(self.trains)}
         return {train: why for train, why in found.items() if why not in (COMPLETE, RUNNING)}
 
     def facts(self, train: int = 0) -> dict[str, Any]:
-        """Attributes of one train: vehicles, seed, DOFs, step, status, simulated time.
+        """Attributes of one train: vehicles, seed, degrees of freedom, time step, status, simulated time.
 
         Args:
             train: Index of the train.
@@ -181,20 +183,20 @@ class Reader:
             InputError: There is no such train.
         """
         with readable(self.name):
-            if (path := f"trains/{train:03d}") in self.file:  # not all of it is checked for its attributes
+            if (path := f"trains/{train:03d}") in self.file:  # the attributes can be read without the structure check
                 return {key: _plain(value) for key, value in self.file[path].attrs.items()}
-        return dict(self[path].attrs)  # says what is there instead
+        return dict(self[path].attrs)  # raises an error that names the nearest path
 
     def group(self, name: str, train: int = 0) -> dict[str, NDArray[Any]]:
-        """All of one group in memory.
+        """Read a whole group into memory.
 
         Args:
-            name: ``"wheel"``, ``"seats"``, ``"gauges/bridge"``.
+            name: Name of the group, for example ``"wheel"``, ``"seats"`` or ``"gauges/bridge"``.
             train: Index of the train.
 
         Returns:
-            Arrays by name: ``time`` [s] (n,), ``position`` [m] (n,), labels, and channels (n, ...); ``seat`` or
-            ``slab`` (n,) and ``chainage`` [m] (n,) instead of times in the envelopes.
+            Arrays by name: ``time`` [s] (n,), ``position`` [m] (n,), labels, and channels (n, ...); in the envelopes
+            ``seat`` or ``slab`` (n,) and ``chainage`` [m] (n,) instead of time and position.
 
         Raises:
             InputError: There is no such train or group.
@@ -203,27 +205,27 @@ class Reader:
             return {key: _array(dataset) for key, dataset in self[f"trains/{train:03d}/{name}"].items()}
 
     def wheel(self, train: int = 0) -> dict[str, NDArray[Any]]:
-        """Contact of every wheel; channels have shape (time, wheelset, side)."""
+        """Contact quantities of all wheels; channels have shape (time, wheelset, side)."""
         return self.group("wheel", train)
 
     def body(self, train: int = 0) -> dict[str, NDArray[Any]]:
-        """Motion of every body; channels have shape (time, body, dof)."""
+        """Motion of all bodies; channels have shape (time, body, dof)."""
         return self.group("body", train)
 
     def irregularity(self, train: int = 0) -> dict[str, NDArray[Any]]:
-        """Irregularity as felt at every wheel; channels have shape (time, wheelset, side)."""
+        """Irregularity under all wheels; channels have shape (time, wheelset, side)."""
         return self.group("irregularity", train)
 
     def seats(self, train: int = 0) -> dict[str, NDArray[Any]]:
-        """Extremes of every fastening's forces; channels have shape (seat, side)."""
+        """Extreme forces of all fastenings; channels have shape (seat, side)."""
         return self.group("seats", train)
 
     def slabs(self, train: int = 0) -> dict[str, NDArray[Any]]:
-        """Extremes of every slab; channels have shape (slab,)."""
+        """Extremes of all slabs; channels have shape (slab,)."""
         return self.group("slabs", train)
 
     def deflection(self, train: int = 0) -> dict[str, NDArray[Any]]:
-        """Rail and slab all along the window; channels have shape (time, side, point)."""
+        """Deflection of rails and slabs along the window; channels have shape (time, side, point)."""
         return self.group("deflection", train)
 
     def gauges(self, train: int = 0) -> dict[str, dict[str, NDArray[Any]]]:
@@ -231,7 +233,7 @@ class Reader:
         return {name: self.group(f"gauges/{name}", train) for name in self[f"trains/{train:03d}/gauges"]}
 
     def close(self) -> None:
-        """Close the file; arrays taken from it stay."""
+        """Close the file; arrays read before remain valid."""
         self.file.close()
 
 
@@ -244,24 +246,24 @@ def open_file(path: Path | str) -> h5py.File:
     """Open the HDF5 file of a result and check its header.
 
     Args:
-        path: The file.
+        path: Result file.
 
     Returns:
-        The open file; nothing but its header has been read.
+        The open file; only its header has been read.
 
     Raises:
-        InputError: There is no such file, it is not a result of this program, or its format is another one.
+        InputError: The file does not exist, is not a result of this program, or has an unknown format version.
     """
     if not is_file(Path(path)):
         raise InputError(f"{path}: no such file")
-    settle(Path(path))
+    complete_commit(Path(path))
     try:
         file = h5py.File(path, "r")
     except OSError:
         if journal_of(Path(path)).exists():
             raise InputError(
-                f"{path}: a crash interrupted its last commit; the journal beside it completes it as soon as"
-                " the file and its folder can be written to"
+                f"{path}: its last commit was interrupted by a crash; it will be completed from the journal as soon as"
+                " the file and its folder are writable"
             ) from None
         raise InputError(f"{path}: not a tiengine result (not an HDF5 file, or damaged)") from None
     try:
@@ -274,26 +276,27 @@ def open_file(path: Path | str) -> h5py.File:
 
 
 def _check_header(attributes: Any, path: Path | str) -> None:
-    """Refuse what another program or another version of this one has written."""
-    given, version = _plain(attributes.get("format")), _plain(attributes.get("format_version"))
-    if not isinstance(given, str) or given != FORMAT:
+    """Refuse files of other programs and of unknown format versions."""
+    name, version = _plain(attributes.get("format")), _plain(attributes.get("format_version"))
+    if not isinstance(name, str) or name != FORMAT:
         raise InputError(f"{path}: not a tiengine result (HDF5, but its attribute format is not {FORMAT!r})")
-    if not isinstance(version, int) or version != FORMAT_VERSION:
+    if not isinstance(version, int) or version not in READABLE_VERSIONS:
+        known = " and ".join(map(str, READABLE_VERSIONS))
         raise InputError(
-            f"{path}: format_version = {version}: this program reads {FORMAT_VERSION}; read it by the version of"
-            f" tiengine that wrote it ({attributes.get('tiengine_version', 'unknown')}), or run its scenario anew"
+            f"{path}: format_version = {version}: this program reads {known}; read it with the version of"
+            f" tiengine that wrote it ({attributes.get('tiengine_version', 'unknown')}), or run its scenario again"
         )
 
 
 def _array(dataset: Any) -> NDArray[Any]:
-    """Contents of a dataset, texts as Python strings."""
+    """Contents of a dataset, with strings as Python strings."""
     if h5py.check_string_dtype(dataset.dtype):
         return np.array(dataset.asstr()[()])
     return np.array(dataset[()])
 
 
 def _plain(value: Any) -> Any:
-    """An attribute as a Python value; bytes that are no text become question marks."""
+    """Attribute as a Python value; bytes that are not valid text become question marks."""
     if isinstance(value, str):
         return value.encode("utf-8", "replace").decode()
     return value.tolist() if isinstance(value, np.generic | np.ndarray) else value

@@ -1,24 +1,19 @@
-"""Streaming a run to HDF5 (layout: format version 1).
+"""Writer of result files: streams a run to HDF5 (format version 2).
 
 ::
 
     /                                   attributes: format, format_version, versions, scenario (TOML), ...
-    /trains/000                         attributes vehicles, seed, status, ...; time -> wheel/time
-    /trains/000/wheel                   channels (time, wheelset, side), see tiengine.channels
-    /trains/000/body                    channels (time, body, dof)
-    /trains/000/irregularity            channels (time, wheelset, side)
-    /trains/000/mortar                  channels (time, slot)
-    /trains/000/seats                   channels (seat, side)
-    /trains/000/slabs                   channels (slab,)
-    /trains/000/deflection              channels (time, side, point)
-    /trains/000/events                  what went wrong: (event,), see tiengine.event_table
-    /trains/000/gauges/NAME             channels (time, direction) or (time,); attributes on, chainage, side or y
+    /trains/000                         attributes vehicles, seed, status, ...
+    /trains/000/wheel                   and other groups of channels, see result_files.layout
+    /trains/000/gauges/NAME             one group per gauge; attributes on, chainage, side or y
+    /trains/000/events                  table of events, see result_files.event_table
 
-Every group holds its own coordinates as dimension scales: ``time`` [s], ``position`` [m] (chainage of the
-first vehicle's centre) and its labels; ``seats`` and ``slabs`` their index and ``chainage`` [m] instead of time.
-Groups sampled together share their times by hard links. Times and chainages are float64, channels float32 or float64.
+Every group holds its own coordinates as dimension scales: ``time`` [s], ``position`` [m] (chainage of the first
+vehicle's centre) and its labels; ``seats`` and ``slabs`` have their index and ``chainage`` [m] instead. Groups sampled
+together share ``time`` and ``position`` by hard links. No coordinate stands above these groups: in a
+tree of xarray, the groups below would have to share it. Times and chainages are float64, channels float32 or float64.
 
-Attribute ``status`` of the root is "running" until the run has come to its end.
+The root attribute ``status`` is "running" until the run has ended.
 """
 
 from __future__ import annotations
@@ -36,21 +31,21 @@ from tiengine.result_files.channels import Channel
 from tiengine.result_files.damage import unreadable
 from tiengine.result_files.event_table import EVENTS, create_events, event_columns
 from tiengine.result_files.events import Event
-from tiengine.result_files.growing_dataset import Column
+from tiengine.result_files.growing_dataset import GrowingDataset
 from tiengine.result_files.layout import CHUNK, DTYPES, Axis, Block, GroupSpec, TrainLabels
 from tiengine.result_files.output_file import DISK_ERRORS, OutputFile, header
-from tiengine.result_files.reader import Reader
+from tiengine.result_files.reader import FORMAT_VERSION, Reader
 
-__all__ = ["Block", "GroupSpec", "TrainLabels", "Writer"]
+__all__ = ["Writer"]
 
-CHECKED = {"fletcher32": True}  # a checksum with every chunk: a damaged number is found out, not taken for one
+CHECKED = {"fletcher32": True}  # a checksum for every chunk, so that damaged numbers are detected
 
 
 class Writer:
-    """A result file that is being written.
+    """Result file that is being written.
 
-    Use as a context manager: leaving it by an exception, or without :meth:`close`, keeps what was committed if samples
-    are in it (the run can be resumed from its checkpoints), and removes the file otherwise.
+    Use as a context manager: leaving it by an exception, or without :meth:`close`, keeps the committed data if they
+    include samples (the run can then be resumed from its checkpoints), and removes the file otherwise.
     """
 
     def __init__(
@@ -67,16 +62,16 @@ class Writer:
         """Create the file, its groups and its empty channels.
 
         Args:
-            path: Where the file shall be; None keeps it in memory.
-            scenario_toml: Resolved scenario.
-            attributes: Root attributes that are known at the beginning.
-            trains: Labels of every train; more may be added later.
-            groups: What each train records; a group comes after the one whose times it shares.
+            path: Path of the file; None keeps it in memory.
+            scenario_toml: Resolved scenario as TOML.
+            attributes: Root attributes known at the beginning.
+            trains: Labels of the trains; more may be added later.
+            groups: Groups of every train; a group must follow the one whose times it shares.
             precision: ``"single"`` or ``"double"`` for channels; time and position are double.
             force: Replace an existing file.
 
         Raises:
-            InputError: The path cannot be written.
+            InputError: The file cannot be written.
         """
         replaces = path is not None and path.exists()
         self._take(OutputFile.create(path, force), groups, precision)
@@ -96,37 +91,42 @@ class Writer:
     def resume(
         cls, path: Path, groups: Mapping[str, GroupSpec], precision: Literal["single", "double"] = "single"
     ) -> Writer:
-        """Go on with a file that a run has left unfinished; see :meth:`rewind`.
+        """Reopen the file of an unfinished run; see :meth:`rewind`.
 
         Args:
-            path: The file.
-            groups: As given when it was created.
-            precision: Likewise.
+            path: Path of the file.
+            groups: Groups as given when the file was created.
+            precision: Precision as given when the file was created.
 
         Raises:
-            InputError: It is not an unfinished result, or another run writes it.
+            InputError: The file is not an unfinished result, or another run is writing it.
         """
         writer = cls.__new__(cls)
         writer._take(OutputFile.resume(path), groups, precision)
         writer._samples_kept = True
+        try:
+            _upgrade(writer._file)
+        except BaseException:
+            writer.leave()
+            raise
         return writer
 
     def _take(self, output: OutputFile, groups: Mapping[str, GroupSpec], precision: str) -> None:
         self._output, self._file, self._path = output, output.h5, output.path
         self._finished = self._samples_written = self._samples_kept = False
         self._specs = dict(groups)
-        self._columns: dict[tuple[int, str], dict[str, Column]] = {}
+        self._columns: dict[tuple[int, str], dict[str, GrowingDataset]] = {}
         self._events: dict[int, int] = {}
         self._dtype = DTYPES[precision]
 
     def __enter__(self) -> Writer:
-        """The writer itself."""
+        """Return the writer itself."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leave the file as it is, or remove an empty one, unless it was closed; say what HDF5 could not read."""
+        """Release the file unless it was closed; convert errors of the disk and of HDF5 to InputError."""
         self.leave()
         if isinstance(error, OSError) and error.errno in DISK_ERRORS:
             raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
@@ -134,12 +134,12 @@ class Writer:
             raise InputError(f"{self._path}: {words}") from error
 
     def add(self, train: int, labels: TrainLabels | None, attributes: Mapping[str, Any] | None = None) -> None:
-        """Add a train to the file, or begin one anew that is in it.
+        """Add a train to the file, or restart one that exists.
 
         Args:
-            train: Its number.
-            labels: Its labels; None for one of which there is nothing to write.
-            attributes: Known at its beginning.
+            train: Number of the train.
+            labels: Labels of the train; None for one without samples.
+            attributes: Attributes of the train known at the beginning.
         """
         node = self._file.require_group(f"trains/{train:03d}")
         if labels is not None:
@@ -149,43 +149,45 @@ class Writer:
         node.attrs.update(attributes or {})
 
     def rewind(self, train: int, rows: Mapping[str, int]) -> None:
-        """Write on from an earlier sample of a train; what the file holds beyond it stays until it is overwritten.
+        """Continue writing after an earlier sample of a train; later samples stay until they are overwritten.
 
         Args:
-            train: Its number.
-            rows: Samples of each group that stay, as from :meth:`rows`; none where not given.
+            train: Number of the train.
+            rows: Number of samples to keep in each group, as from :meth:`rows`; missing groups keep none.
 
         Raises:
-            InputError: The file holds fewer.
+            InputError: The file holds fewer samples.
         """
         node = self._file[f"trains/{train:03d}"]
         for name, spec in self._specs.items():
-            grow = (*spec.channels, *(() if spec.times_of else (spec.axis.name, spec.axis.place)))
+            grow = (*spec.channels, *(() if spec.times_of else (spec.axis.name, spec.axis.chainage)))
             kept = rows.get(name, 0)
             if any(node[f"{name}/{key}"].shape[0] < kept for key in grow):
-                raise InputError(f"{self._path}: train {train} holds less than its checkpoint says; run it anew")
-            self._columns[train, name] = {key: Column(node[f"{name}/{key}"], kept) for key in grow}
+                raise InputError(
+                    f"{self._path}: train {train} has fewer samples than its checkpoint states; run the scenario again"
+                )
+            self._columns[train, name] = {key: GrowingDataset(node[f"{name}/{key}"], kept) for key in grow}
         self._events[train] = rows.get(EVENTS, 0)
 
     def rows(self, train: int) -> dict[str, int]:
-        """Samples of each group of a train written so far."""
+        """Number of samples of each group of a train written so far."""
         samples = {name: next(iter(self._columns[train, name].values())).length for name in self._specs}
         return samples | {EVENTS: self._events[train]}
 
     def describe(self, train: int, attributes: Mapping[str, Any]) -> None:
-        """Add attributes to a train of the file."""
+        """Add attributes to a train."""
         self._file[f"trains/{train:03d}"].attrs.update(attributes)
 
     def facts(self) -> dict[int, dict[str, Any]]:
-        """Attributes of every train in the file."""
+        """Attributes of all trains in the file."""
         return {int(name): dict(node.attrs) for name, node in self._file["trains"].items()}
 
-    def note(self, train: int, events: Sequence[Event]) -> None:
-        """Add events to a train of the file.
+    def add_events(self, train: int, events: Sequence[Event]) -> None:
+        """Append events to a train.
 
         Args:
-            train: Its number.
-            events: What happened, in order.
+            train: Number of the train.
+            events: Events in order.
         """
         group = self._file[f"trains/{train:03d}/{EVENTS}"]
         start = self._events[train]
@@ -196,45 +198,45 @@ class Writer:
             group[name][start:end] = column
 
     def write(self, train: int, blocks: Mapping[str, Block]) -> None:
-        """Add samples to the groups of one train.
+        """Append samples to the groups of one train.
 
         Args:
             train: Index of the train.
             blocks: Samples by group.
 
         Raises:
-            InputError: The disk is full or gone.
+            InputError: The disk is full or has failed.
         """
         for group, block in blocks.items():
-            self.append(train, group, block.along, block.place, block.channels)
+            self.append(train, group, block.along, block.chainage, block.channels)
 
     def append(
-        self, train: int, group: str, along: NDArray[Any], place: Reals, channels: Mapping[str, NDArray[Any]]
+        self, train: int, group: str, along: NDArray[Any], chainage: Reals, channels: Mapping[str, NDArray[Any]]
     ) -> None:
-        """Add samples to one group of one train.
+        """Append samples to one group of one train.
 
         Args:
             train: Index of the train.
             group: Name of the group.
-            along: Times [s], or indices of seats or slabs, shape (n,); ignored where the group shares another one's.
-            place: Chainages that belong to them [m], shape (n,); likewise.
-            channels: Every channel of the group, shape (n, *dimensions).
+            along: Times [s], or indices of seats or slabs, shape (n,); ignored if the group shares those of another.
+            chainage: Chainages [m], shape (n,); ignored likewise.
+            channels: All channels of the group, each of shape (n, *dimensions).
 
         Raises:
             ValueError: A channel is missing, unknown, or of the wrong shape.
-            InputError: The disk is full or gone.
+            InputError: The disk is full or has failed.
         """
         self._samples_written = True
         columns = self._columns[train, group]
         spec = self._specs[group]
         if set(channels) != set(spec.channels):
-            odd = sorted(set(channels) ^ set(spec.channels))
-            raise ValueError(f"group {group!r}: channels missing or unknown: {', '.join(odd)}")
+            differing = sorted(set(channels) ^ set(spec.channels))
+            raise ValueError(f"group {group!r}: channels missing or unknown: {', '.join(differing)}")
         values: dict[str, NDArray[Any]] = dict(channels)
         if spec.times_of is None:
-            values |= {spec.axis.name: along, spec.axis.place: place}
+            values |= {spec.axis.name: along, spec.axis.chainage: chainage}
         for name, value in values.items():
-            expected = (len(along), *columns[name].rest)
+            expected = (len(along), *columns[name].sample_shape)
             if value.shape != expected:
                 raise ValueError(f"{group}/{name}: shape {value.shape}, expected {expected}")
             try:
@@ -243,10 +245,10 @@ class Writer:
                 raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
 
     def commit(self) -> None:
-        """Make what was written permanent; the file can be read with it from now on, whatever happens.
+        """Make all written data permanent; readers see them from now on.
 
         Raises:
-            InputError: The disk is full or gone.
+            InputError: The disk is full or has failed.
         """
         self._output.commit()
         self._samples_kept |= self._samples_written
@@ -255,26 +257,26 @@ class Writer:
         """Complete the file.
 
         Args:
-            attributes: Root attributes known at the end: DOFs, step, wall times.
+            attributes: Root attributes known at the end: degrees of freedom, time step, wall times.
 
         Returns:
             The finished result, open for reading.
 
         Raises:
-            InputError: The file could not be completed; it is as of the last commit.
+            InputError: The file cannot be completed; it holds the last commit.
         """
         result = self._output.complete(attributes)
         self._finished = True
         return result
 
     def leave(self) -> None:
-        """Leave a file that was not closed as of its last commit; remove it if it held no samples then."""
+        """Release a file that was not closed: keep its last commit, or remove it if that holds no samples."""
         if not self._finished:
             self._finished = True
             self._output.leave(keep=self._samples_kept)
 
     def _create_train(self, train: Any, labels: TrainLabels) -> None:
-        """Groups, scales and empty channels of one train."""
+        """Create the groups, scales and empty channels of one train."""
         train.attrs["vehicles"] = list(labels.vehicles)
         for name, spec in self._specs.items():
             group = train.create_group(name)
@@ -283,48 +285,56 @@ class Writer:
             if spec.times_of is None:
                 _create_axis(group, axis)
             else:
-                for dataset in (axis.name, axis.place):
+                for dataset in (axis.name, axis.chainage):
                     group[dataset] = train[f"{spec.times_of}/{dataset}"]
-            coordinates = [axis.place]
+            coordinates = [axis.chainage]
             for dimension, (values, meaning) in labels.scales(spec.dimensions).items():
                 _describe(group.create_dataset(dimension, data=values), meaning).make_scale(dimension)
-                coordinates += _create_details(group, dimension, labels)
+                coordinates += _create_auxiliary(group, dimension, labels)
             for channel, meaning in spec.channels.items():
                 self._create_channel(group, channel, meaning, spec, coordinates)
-        if "wheel" in self._specs:
-            train["time"] = train["wheel/time"]
         create_events(train.create_group(EVENTS))
 
     def _create_channel(
         self, group: Any, name: str, meaning: Channel, spec: GroupSpec, coordinates: Sequence[str]
     ) -> None:
-        """One empty channel with its scales."""
-        rest = tuple(group[dimension].shape[0] for dimension in spec.dimensions)
-        chunks = (spec.chunk, *rest)
-        dataset = group.create_dataset(name, (0, *rest), self._dtype, maxshape=(None, *rest), chunks=chunks, **CHECKED)
+        """Create an empty channel with its scales."""
+        fixed = tuple(group[dimension].shape[0] for dimension in spec.dimensions)
+        dataset = group.create_dataset(
+            name, (0, *fixed), self._dtype, maxshape=(None, *fixed), chunks=(spec.chunk, *fixed), **CHECKED
+        )
         _describe(dataset, meaning).attrs["coordinates"] = " ".join(coordinates)
         for i, dimension in enumerate((spec.axis.name, *spec.dimensions)):
             dataset.dims[i].attach_scale(group[dimension])
 
 
+def _upgrade(file: Any) -> None:
+    """Convert a file of format version 1, which has a dataset ``time`` in every train, to the current version."""
+    for train in file["trains"].values():
+        if "time" in train:
+            del train["time"]
+    file.attrs["format_version"] = FORMAT_VERSION
+
+
 def _create_axis(group: Any, axis: Axis) -> None:
-    """Empty scale of the dimension along which a group grows, and the chainages that go with it."""
+    """Create the empty scale of the growing dimension and its dataset of chainages."""
     scale = group.create_dataset(axis.name, (0,), axis.dtype, maxshape=(None,), chunks=(CHUNK,), **CHECKED)
     _describe(scale, axis.meaning).make_scale(axis.name)
-    place = group.create_dataset(axis.place, (0,), "f8", maxshape=(None,), chunks=(CHUNK,), **CHECKED)
-    _describe(place, axis.place_meaning)
-    place.dims[0].attach_scale(scale)
+    chainage = group.create_dataset(axis.chainage, (0,), "f8", maxshape=(None,), chunks=(CHUNK,), **CHECKED)
+    _describe(chainage, axis.chainage_meaning)
+    chainage.dims[0].attach_scale(scale)
 
 
-def _create_details(group: Any, dimension: str, labels: TrainLabels) -> list[str]:
-    """What else is known along a dimension; the names of the datasets."""
-    rows = labels.details(dimension)
-    for name, (values, meaning) in rows.items():
+def _create_auxiliary(group: Any, dimension: str, labels: TrainLabels) -> list[str]:
+    """Create the auxiliary coordinates along a dimension and return their names."""
+    found = labels.auxiliary(dimension)
+    for name, (values, meaning) in found.items():
         _describe(group.create_dataset(name, data=values), meaning).dims[0].attach_scale(group[dimension])
-    return list(rows)
+    return list(found)
 
 
 def _describe(dataset: Any, meaning: Channel) -> Any:
+    """Set unit and long name of a dataset and return it."""
     dataset.attrs["units"] = meaning.units
     dataset.attrs["long_name"] = meaning.long_name
     return dataset

@@ -1,4 +1,4 @@
-"""Results as xarray datasets: coordinates, units and long names as in the file."""
+"""Results as xarray datasets, with the coordinates, units and long names of the file."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 __all__ = ["open_dataset", "stacked_dataset"]
 
 ALONG_TRACK = ("time", "seat", "slab")
-"""Dimensions of which trains may have done different stretches; what one of them has not is not a number."""
+"""Dimensions along which trains may cover different ranges; missing samples are filled with NaN."""
 
 
 def open_dataset(result: Reader, file: h5py.File, group: str, train: int) -> xarray.Dataset:
-    """One group of one train; a channel is read when its values are asked for, while the result is open.
+    """Group of one train; channels are read on access, while the result is open.
 
     Args:
         result: Open result.
-        file: Its file.
-        group: ``"wheel"``, ``"gauges/bridge"``.
+        file: HDF5 file of the result.
+        group: Name of the group, for example ``"wheel"`` or ``"gauges/bridge"``.
         train: Index of the train.
 
     Raises:
@@ -43,15 +43,15 @@ def open_dataset(result: Reader, file: h5py.File, group: str, train: int) -> xar
 
 
 def stacked_dataset(result: Reader, file: h5py.File, group: str) -> xarray.Dataset:
-    """One group of all trains, read into memory, with the dimension ``train``.
+    """Group of all trains, read into memory, with the additional dimension ``train``.
 
-    Trains that ran a shorter way are filled with "not a number". A train that failed before its first sample is left
-    out. Each train's seed and status come as coordinates.
+    Trains that ran a shorter distance are filled with NaN. A train that failed before its first sample is omitted.
+    Seed and status of the trains become coordinates.
 
     Args:
         result: Open result.
-        file: Its file.
-        group: As of :func:`open_dataset`.
+        file: HDF5 file of the result.
+        group: Name of the group, as in :func:`open_dataset`.
 
     Raises:
         InputError: No train has such a group, or trains differ in vehicles, time step or gauges.
@@ -73,22 +73,22 @@ def stacked_dataset(result: Reader, file: h5py.File, group: str) -> xarray.Datas
 
 
 def _check_alike(which: str, first: xarray.Dataset, other: xarray.Dataset) -> None:
-    """Refuse trains that cannot share axes."""
+    """Refuse trains whose coordinates differ."""
     for name in first.dims:
         ours, theirs = first[name].values, other[name].values
         if name in ALONG_TRACK:
             n = min(len(ours), len(theirs))
             if name == "time" and not np.array_equal(ours[:n], theirs[:n]):
-                raise InputError(f"{which} have different time steps; take them one by one")
+                raise InputError(f"{which} have different time steps; open them one by one")
         elif not np.array_equal(ours, theirs):
-            raise InputError(f"{which} differ along {name!r}; take them one by one")
+            raise InputError(f"{which} differ along {name!r}; open them one by one")
     for name in ("wheelset_vehicle", "wheelset_offset"):
         if name in first.coords and not np.array_equal(first[name].values, other[name].values):
-            raise InputError(f"{which} have different vehicles; take them one by one")
+            raise InputError(f"{which} have different vehicles; open them one by one")
 
 
 def _packages() -> tuple[Any, Any]:
-    """The packages xarray and h5netcdf, which do not come with the engine."""
+    """Import xarray and h5netcdf, which are optional dependencies."""
     try:
         import h5netcdf
         import xarray

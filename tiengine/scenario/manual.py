@@ -19,9 +19,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION, GROUPS
-from tiengine.result_files.layout import GroupSpec
+from tiengine.result_files.layout import DIMENSIONS, GAUGE_DIMENSIONS
 from tiengine.scenario.key_checks import NumberOr
-from tiengine.scenario.parts import ProfilePoints
+from tiengine.scenario.profile_part import ProfilePoints
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.fastening import Fastening
 from tiengine.track.mortar import Mortar
@@ -261,10 +261,9 @@ def _inner(annotation: Any) -> FieldInfo | None:
 
 def channel_tables() -> str:
     """Channel tables of every group of a result as Markdown."""
-    specs = {name: GroupSpec.standard(name, tuple(channels)) for name, channels in GROUPS.items()}
-    groups = [(name, (spec.axis.name, *spec.dimensions), spec.channels) for name, spec in specs.items()]
-    groups.append(("gauges/NAME, on rail or slab", ("time", "direction"), GAUGE_MOTION))
-    groups.append(("gauges/NAME, on a fastening", ("time",), GAUGE_FORCE))
+    groups = [(name, DIMENSIONS[name], channels) for name, channels in GROUPS.items()]
+    groups.append(("gauges/NAME, on rail or slab", GAUGE_DIMENSIONS["motion"], GAUGE_MOTION))
+    groups.append(("gauges/NAME, on a fastening", GAUGE_DIMENSIONS["force"], GAUGE_FORCE))
     lines: list[str] = []
     for name, dimensions, channels in groups:
         lines += ["", f"### {name}", "", f"Dimensions: {', '.join(dimensions)}.", ""]

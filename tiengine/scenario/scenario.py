@@ -16,7 +16,9 @@ import numpy as np
 import tomli_w
 from pydantic import Field
 
-from tiengine.irregularity.irregularity import IrregularityParams, check_step
+from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.track_checks import check_wave
+from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path
 from tiengine.parameters.presets import find_preset
@@ -126,7 +128,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
         path = find_preset("scenarios", str(source), called="scenario")
         folder, tables = path.parent, load_toml(path)
         tables.setdefault("name", path.stem)
-    tables = _absolute(apply_overrides(tables, overrides), folder)
+    tables = _absolute(apply_overrides(tables, overrides, Scenario), folder)
     scenario = build(Scenario, tables)
     ensemble = _absolute_vary(scenario.ensemble, folder)
     presets = collect_presets(scenario.train, scenario.track, scenario.presets, folder)
@@ -143,7 +145,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
 def _changed(tables: dict[str, Any], ensemble: Ensemble, train: int) -> Scenario:
     """Scenario of one train, from the tables of the ensemble."""
     try:
-        return build(Scenario, apply_overrides({**tables, "ensemble": {}}, ensemble.changes(train)))
+        return build(Scenario, apply_overrides({**tables, "ensemble": {}}, ensemble.changes(train), Scenario))
     except InputError as error:
         raise InputError(f"train {train} of the ensemble: {error}") from None
 
@@ -238,6 +240,13 @@ def _check(scenario: Scenario) -> None:
             f"train.speed_kmh: {scenario.train.distance:g} m take up to {duration:.3g} s;"
             f" must be at most {LONGEST_RUN:g} s"
         )
+    begin = scenario.rear + scenario.centre_in_window
+    adhesion = scenario.train.speed.largest_acceleration(begin, begin + scenario.train.distance) / GRAVITY
+    if scenario.train.effort == "wheels" and adhesion >= scenario.track.friction:
+        raise InputError(
+            f"train.speed_kmh: needs an adhesion of {adhesion:.3g}; must be below track.friction ="
+            f" {scenario.track.friction:g} for wheels that brake or drive (train.effort)"
+        )
     zone, widest = scenario.numerics.absorbing_zone, 0.5 * (window - least)
     if zone > widest + 1e-9:
         raise InputError(
@@ -301,7 +310,7 @@ def check_wavelength(scenario: Scenario, step: float) -> None:
     if irregularity.short_wave:
         shortest["short_wave_min"] = irregularity.short_wave_min
     for key, wavelength in shortest.items():
-        check_step(wavelength, scenario.train.speed.fastest, step, f"irregularity.{key}")
+        check_wave(f"irregularity.{key}", wavelength, scenario.train.speed.fastest, step)
 
 
 def duration(train: Scenario) -> float:

@@ -17,6 +17,7 @@ from tiengine.scenario.part import Part
 from tiengine.track.defects import FailedFastenings
 from tiengine.track.knots import Grading
 from tiengine.track.mortar import MortarVoid
+from tiengine.vehicle.assembly import Effort
 from tiengine.vehicle.speed_programme import SpeedProfile
 
 __all__ = ["Contact", "Numerics", "Output", "Track", "Train"]
@@ -60,6 +61,14 @@ class Train(Params):
         bool,
         Field(description="springs in series with dampers (k_series) are modelled; a vehicle may also set this itself"),
     ] = False
+
+    effort: Annotated[
+        Effort,
+        Field(
+            description='where the force that changes the speed acts: "wheels", braked or driven, so that creep forces'
+            ' carry it; "axles", as from a linear motor'
+        ),
+    ] = "wheels"
 
     @property
     def speed(self) -> SpeedProfile:

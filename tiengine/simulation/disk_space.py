@@ -1,4 +1,4 @@
-"""Estimated size of a result file, before the run."""
+"""Size of a result file, estimated before the run."""
 
 from __future__ import annotations
 
@@ -6,34 +6,35 @@ import math
 import shutil
 from pathlib import Path
 
+from tiengine.parameters.conventions import SIDES
 from tiengine.parameters.errors import InputError
 from tiengine.recording.deflection import window_points
 from tiengine.recording.recorder import Recorder
 from tiengine.recording.trackside import trackside_groups
-from tiengine.result_files.channels import DOFS
+from tiengine.result_files.channels import DIRECTIONS, DOFS
 from tiengine.result_files.layout import CHUNK
 from tiengine.scenario.scenario import Scenario, duration
 
 __all__ = ["check_space", "estimated_bytes"]
 
 USUAL_STEP = 2e-4
-"""Step [s] assumed for "auto", which tries it first."""
+"""Time step [s] assumed for "auto", which tries longer ones first."""
 
 SLACK = 1.05
-"""Factor for events, journal and checkpoints; without it the estimate is within 0.7 % for files of 2 to 14 MB."""
+"""Factor for events, journal and checkpoints; without it, estimates for files of 2 to 14 MB are within 0.7 %."""
 
 OF_DATASET = 2_100
 """Bytes of a dataset without its samples: header, attributes, scales; 1.5 to 2.0 kB measured."""
 
 OF_CHUNK = 60
-"""Bytes of a chunk without its samples: its entry in an index that is half full."""
+"""Bytes of a chunk without its samples: its entry in the index, half filled."""
 
 
 def estimated_bytes(scenario: Scenario) -> int:
-    """Size of the result file of a scenario, within about ten per cent [bytes].
+    """Size of the result file of a scenario in bytes, to about ten per cent.
 
     Args:
-        scenario: All trains.
+        scenario: Scenario with all its trains.
     """
     return round(SLACK * sum(_bytes_of(train) for train in scenario.members))
 
@@ -42,11 +43,11 @@ def check_space(scenario: Scenario, path: Path) -> None:
     """Refuse a run whose result will not fit on the disk.
 
     Args:
-        scenario: All trains.
+        scenario: Scenario with all its trains.
         path: Path of the result file.
 
     Raises:
-        InputError: The disk has too little space; the message says how much is missing.
+        InputError: The free space is too small; the message states how much is missing.
     """
     needed, free = estimated_bytes(scenario), shutil.disk_usage(path.parent).free
     if needed > free:
@@ -57,7 +58,7 @@ def check_space(scenario: Scenario, path: Path) -> None:
 
 
 def _bytes_of(train: Scenario) -> float:
-    """Bytes of one train."""
+    """Bytes of the data of one train."""
     real = {"single": 4, "double": 8}[train.output.precision]
     found = 0.0
     for name, spec in (Recorder.groups_of(train) | trackside_groups(train)).items():
@@ -70,13 +71,13 @@ def _bytes_of(train: Scenario) -> float:
 
 
 def _grown(rows: float, chunk: int, sample: int) -> float:
-    """Bytes of a dataset that grows to a number of rows; HDF5 keeps whole chunks."""
+    """Bytes of a dataset that grows to a number of rows; HDF5 stores whole chunks."""
     chunks = math.ceil(rows / chunk)
     return OF_DATASET + chunks * (chunk * sample + OF_CHUNK)
 
 
 def _rows(train: Scenario, group: str) -> float:
-    """Rows of a group."""
+    """Number of samples of a group."""
     out, slab = train.output, train.parts.slab
     step = train.numerics.time_step
     dt = USUAL_STEP if step == "auto" else float(step)
@@ -92,25 +93,27 @@ def _rows(train: Scenario, group: str) -> float:
             return (distance + train.window_length) / slab.pitch + 1
         case "deflection":
             return time / float(out.deflection_interval)
-        case _:  # a gauge, while it is in the window
+        case _:  # a gauge is recorded while it is in the window
             return float(min(time, train.window_length / min(train.train.speed.speed)) / dt)
 
 
 def _length(train: Scenario, group: str, dimension: str) -> int:
-    """Length of a dimension that does not grow."""
-    parts = train.parts
+    """Length of a dimension of fixed length."""
+    vehicles, slab = train.parts.vehicles, train.parts.slab
     return {
-        "wheelset": len(parts.wheelset_positions),
-        "body": sum(len(vehicle.body) for vehicle in parts.vehicles),
+        "wheelset": sum(len(vehicle.axle_positions) for vehicle in vehicles),
+        "body": sum(len(vehicle.body) for vehicle in vehicles),
         "dof": len(DOFS),
-        "slot": parts.slab.slots(train.window_length, train.numerics.slab_count == "cover"),
+        "side": len(SIDES),
+        "direction": len(DIRECTIONS),
+        "slot": slab.slots(train.window_length, train.numerics.slab_count == "cover"),
         "point": len(window_points(train.window_length)),
-    }.get(dimension, 2)
+    }[dimension]
 
 
-def _interval(setting: float | str, dt: float) -> float:
-    """Interval of an output that is sampled at whole steps [s]."""
-    return dt if isinstance(setting, str) else max(round(setting / dt), 1) * dt
+def _interval(stated: float | str, dt: float) -> float:
+    """Interval of samples [s], a whole number of steps; "auto" or "every" is one step."""
+    return dt if isinstance(stated, str) else max(round(stated / dt), 1) * dt
 
 
 def _size(count: int) -> str:

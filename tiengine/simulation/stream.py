@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from tiengine.irregularity.irregularity import Irregularity
 from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.checkpoint import Checkpoint
@@ -54,7 +55,7 @@ def run_task(
         yield Lost(task.trains, str(error), refused=True)
         return
     setup = time.perf_counter() - clock - run.jit
-    yield Begun(task.number, run.labels, facts_at_start(task, run.stepper.ingredients))
+    yield Begun(task.number, run.labels, facts_at_start(task, run.stepper.ingredients, run.tracks))
     before = 0.0 if saved is None else float(saved.facts["loop"])
     clock = last = time.perf_counter()
     try:
@@ -79,7 +80,7 @@ def _functions(ingredients: Ingredients) -> dict[str, int]:
     return {"modes" if ingredients.grading is None else "functions": ingredients.functions.count}
 
 
-def facts_at_start(task: Task, ingredients: Ingredients) -> dict[int, dict[str, Any]]:
+def facts_at_start(task: Task, ingredients: Ingredients, tracks: Sequence[Irregularity]) -> dict[int, dict[str, Any]]:
     """Facts of each train that are known from the start, by its number."""
     shared = {
         **{f"dofs_{name}": count for name, count in ingredients.dof_counts.items() if name != "total"},
@@ -91,4 +92,9 @@ def facts_at_start(task: Task, ingredients: Ingredients) -> dict[int, dict[str, 
         "slabs": ingredients.slots,
         "seats_in_window": ingredients.seats,
     }
-    return {number: {**shared, "seed": task.tracks[b].seed} for b, number in enumerate(task.trains)}
+    facts: dict[int, dict[str, Any]] = {}
+    for b, number in enumerate(task.trains):
+        facts[number] = {**shared, "seed": task.tracks[b].seed}
+        if tracks[b].description:
+            facts[number]["irregularity_file"] = tracks[b].description
+    return facts

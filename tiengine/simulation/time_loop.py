@@ -20,7 +20,8 @@ from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Stepper
 from tiengine.engine.time_step import prepare
-from tiengine.irregularity.irregularity import Irregularity, check_reach, make_irregularity
+from tiengine.irregularity.irregularity import Irregularity, make_irregularity
+from tiengine.irregularity.track_checks import check_reach
 from tiengine.model.constant_data import Model
 from tiengine.recording.guards import Guard
 from tiengine.recording.recorder import Recorder
@@ -249,5 +250,5 @@ def _until(blocks: dict[str, Block], time: float) -> dict[str, Block]:
     for name, block in blocks.items():
         count = int(np.searchsorted(block.along, time * (1.0 + 1e-12), side="right"))
         channels = {channel: values[:count] for channel, values in block.channels.items()}
-        kept[name] = Block(block.along[:count], block.place[:count], channels)
+        kept[name] = Block(block.along[:count], block.chainage[:count], channels)
     return kept

@@ -1,9 +1,9 @@
-"""The step against scipy's BDF (the paper used its relative, MATLAB's ode15s) on the same equations.
+"""The step against SciPy's BDF (the paper used the related ode15s of MATLAB) on the same equations.
 
-The equations are assembled apart from the step (:mod:`validation.cases.semi_discrete`). A window of the wheels and 2 m
-at either end, one mode a metre, three plate elements a slab: 431 degrees of freedom. The German spectrum for high
-disturbance begins within 2 m, so that all wheels move vertically and laterally. Errors are the largest over all wheels
-and times as a part of the forces' range.
+The equations are assembled independently of the step (:mod:`validation.cases.semi_discrete`). The window extends 2 m
+beyond the outer wheels, with one mode per metre and three plate elements per slab: 431 degrees of freedom. The German
+spectrum for high disturbance begins within 2 m, so that all wheels move vertically and laterally. Errors are the
+largest over all wheels and times, relative to the range of the forces.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from scipy.integrate import solve_ivp
 from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.sine_state import SineState
 from tiengine.irregularity.irregularity import make_irregularity
+from tiengine.model.from_scenario import ingredients
+from tiengine.model.sine_model import build_sine_model
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulation.simulate import prepare
 from validation.cases.semi_discrete import SemiDiscrete
 from validation.frame.case import Case
 from validation.frame.runs import simulate
@@ -31,7 +32,7 @@ SHORT = (
     'track.slab={like="CRTS_III", elements_x=3, elements_y=1}',
 )
 RTOL = 1e-8
-SIZES = 1e-4, 1e-2  # m or rad, and their rates: what absolute tolerances are taken of
+SIZES = 1e-4, 1e-2  # m or rad, and their rates: scales of the absolute tolerances
 SAMPLE, DURATION = 2e-4, 0.05
 STEPS = (1e-4, 5e-5, 2.5e-5)
 
@@ -40,8 +41,8 @@ STEPS = (1e-4, 5e-5, 2.5e-5)
 def _reference() -> NDArray[np.float64]:
     """Vertical and lateral wheel forces by BDF [N], shape (samples, wheelsets, 2, 2)."""
     scenario = load_scenario("paper", [*SHORT, "numerics.time_step=1e-4"])
-    model, _ = prepare(scenario)
     V = scenario.train.speed.at(0.0)[0]
+    model = build_sine_model(ingredients(scenario, STEPS[0]), V)
     state = SineState.at_rest(model)
     equilibrium(model, state, 0.0, V)
     track = make_irregularity(scenario.irregularity, float(model.ingredients.wheel_s.max()))
@@ -73,7 +74,7 @@ def _error(dt: float) -> NDArray[np.float64]:
 
 
 def _orders() -> NDArray[np.float64]:
-    """Order in dt of both, from 1e-4 to 5e-5 and on to 2.5e-5 s."""
+    """Order in dt of both errors, from 1e-4 to 5e-5 and from 5e-5 to 2.5e-5 s."""
     errors = np.array([_error(dt) for dt in STEPS])
     return np.log2(errors[:-1] / errors[1:]).ravel()
 
@@ -84,10 +85,10 @@ CASES = (
             name=f"bdf-{dt:g}",
             kind="verification",
             quantity=f"first 0.05 s: vertical and lateral wheel forces less BDF's, over their range, dt = {dt:g} s",
-            source="scipy.integrate BDF, rtol 1e-8, same right-hand side assembled apart from the step",
+            source="scipy.integrate BDF, rtol 1e-8, same right-hand side, assembled independently of the step",
             reference=[0.0, 0.0],
             atol=1e-3 * (dt / 1e-4) ** 2,
-            why="a part in a thousand at 1e-4 s, second order from there",
+            why="1e-3 at 1e-4 s, second order below",
             compute=lambda dt=dt: _error(dt),
             quick=False,
         )

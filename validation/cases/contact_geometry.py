@@ -1,13 +1,13 @@
 """Quasi-static contact of wheelsets on straight track: stations and equivalent conicities.
 
-References: an independent calculation made before this program (digits as printed there), its
-conicities by harmonic linearisation of a rolling-radius difference sampled every 0.25 mm; the nominal
+References: an independent calculation older than this program (with its printed digits), whose
+conicities are by harmonic linearisation of a rolling-radius difference sampled every 0.25 mm; the nominal
 rolling radius that a public code (VTCM_simulation, GitHub) hard-codes for LMA; EN 15302 gives 0.18 for
 S1002 on 60E1 at 3 mm. Frame: the wheelset is shifted to the right; stations outward from the tape
 circle.
 
-Left out of the finely integrated conicities: amplitudes whose quarter sine passes a jump of the
-contact, where 0.25 mm samples decide (S1002 beyond 4 mm and, on 60E1, at 1 mm).
+Omitted from the finely integrated conicities: amplitudes whose quarter sine passes a jump of the
+contact, where the reference depends on its samples of 0.25 mm (S1002 beyond 4 mm and, on 60E1, at 1 mm).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ["CASES", "draw"]
 
 INDEPENDENT = "independent calculation"
 EUROPE = {"gauge_depth": 0.014, "half_spacing": 0.75, "wheel_radius": 0.46}
-PAIRS = (
+PAIRS: tuple[tuple[str, str, dict[str, float], tuple[float, ...], slice], ...] = (
     ("LMA", "CHN60", {}, (0.0256, 0.0270, 0.0350, 0.0420, 0.0482, 0.0539, 0.0631), slice(0, 6)),
     (
         "LMA",
@@ -44,7 +44,8 @@ AMPLITUDES = np.arange(1.0, 8.0) * 1e-3
 
 
 def _pair(wheel: str, rail: str, settings: dict[str, float]) -> WheelRailPair:
-    return WheelRailPair(load_profile(wheel, "wheel"), load_profile(rail, "rail"), ContactSettings(**settings))
+    placed = ContactSettings(**settings)  # type: ignore[arg-type]
+    return WheelRailPair(load_profile(wheel, "wheel"), load_profile(rail, "rail"), placed)
 
 
 def _stations() -> dict[str, Reals]:
@@ -60,7 +61,7 @@ def _stations() -> dict[str, Reals]:
 
 
 def _sampled(wheel: str, rail: str, settings: dict[str, float]) -> Reals:
-    """Conicities from a difference sampled every 0.25 mm, as in their source."""
+    """Conicities from a rolling-radius difference sampled every 0.25 mm, as in the source."""
     y = np.arange(0.0, 7.3, 0.25) * 1e-3
     difference = rolling_radius_difference(_pair(wheel, rail, settings), y)
     t = (np.arange(4000) + 0.5) * np.pi / 8000.0
@@ -74,12 +75,12 @@ def draw(path: Path) -> None:
     Args:
         path: PNG to write.
     """
-    import matplotlib as mpl  # here: the table does not need it
+    import matplotlib as mpl  # imported here, since the table does not need it
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    colours = ("#0072B2", "#56B4E9", "#D55E00", "#CC79A7")  # of Okabe and Ito, told apart by any eye
+    colours = ("#0072B2", "#56B4E9", "#D55E00", "#CC79A7")  # Okabe-Ito palette, distinct for colour-blind readers
     fine = np.linspace(1.0, 8.0, 141) * 1e-3
     figure, axis = plt.subplots(figsize=(7.5, 4.5), layout="constrained")
     for (wheel, rail, settings, printed, _), colour, mark in zip(PAIRS, colours, "osD^", strict=True):
@@ -119,21 +120,21 @@ CASES = (
                 "contact on right and left wheel [mm]",
                 ((6.05, 0.41, -8.90, -23.80), (6.05, 9.12, 12.23, 14.36)),
                 6e-3 * _JUMPY,
-                "printed digits; twice where 1 um of shift is 3 to 12 um of contact",
+                "printed digits; twice that where a shift of 1 um moves the contact by 3 to 12 um",
             ),
             (
                 "radius",
                 "rolling radius less r0, right and left [mm]",
                 ((-0.171, -0.014, 0.395, 2.225), (-0.171, -0.248, -0.326, -0.379)),
                 7e-4 * _JUMPY,
-                "printed digits; twice where the contact moves 3 to 12 times the shift",
+                "printed digits; twice that where the contact moves by 3 to 12 times the shift",
             ),
             (
                 "angle",
                 "contact angle, right and left [deg]",
                 ((1.43, 1.92, 3.11, 11.73), (1.43, 1.43, 1.43, 1.43)),
                 0.03,
-                "0.5 mrad: printed digits and the plane in which it is read (track or axle)",
+                "0.5 mrad: printed digits and the reference plane of the angle (track or axle)",
             ),
         )
     ),
@@ -141,10 +142,10 @@ CASES = (
         name="nominal-radius",
         kind="validation",
         quantity="LMA on CHN60, centred: rolling radius [mm]",
-        source="VTCM_simulation (GitHub), a constant of the code",
+        source="VTCM_simulation (GitHub), a constant in the code",
         reference=429.8267,
         atol=5e-3,
-        why="5 um: its own table of LMA",
+        why="5 um: that code has its own table of LMA",
         compute=lambda: 430.0 + _stations()["radius"][0, 0],
     ),
     *(

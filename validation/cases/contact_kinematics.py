@@ -1,9 +1,9 @@
-"""Contact forces and creepages against the geometry they come from.
+"""Contact forces and creepages against their geometry.
 
 References: virtual work: a frictionless contact has the generalised forces -N cos(gamma) dp/dq, p being
 the vertical penetration; a wheel that follows the shape of its rail exactly rolls on it and has no
 creepage from it. The derivatives are central differences of the penetration that the kernel returns,
-the angle that turns with the rail included.
+including the angle that turns with the rail.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _virtual_work() -> tuple[float, float]:
 
 
 def _following() -> Reals:
-    """Change of lateral creepage by following a slope of 1 mm/m of track or rail, four ways."""
+    """Change of lateral creepage if the wheel follows a slope of 1 mm/m of track or rail, vertically and laterally."""
     wheelset, rates = np.zeros((5, 5)), np.zeros((5, 5))
     rails, channels = np.zeros((5, 2, 9)), np.zeros((5, at.N_IRREGULARITY))
     wheelset[:, 1] = 1e-4
@@ -115,14 +115,16 @@ CASES = (
         source="virtual work; p differentiated numerically at 200 random states",
         reference=0.0,
         atol=3e-3,
-        why="first order in the angles: 3 mm of lever",
+        why="first order in the angles: a lever of 3 mm",
         compute=lambda: _virtual_work()[1],
     ),
     Case(
         name="rolling-along-a-shape",
         kind="verification",
-        quantity=("lateral creepage of a wheelset that follows a slope of 1e-3 of track or rail, down and across"),
-        source="what rolls along a shape does not slip on it",
+        quantity=(
+            "lateral creepage of a wheelset that follows a slope of 1e-3 of track or rail, vertically and laterally"
+        ),
+        source="a wheel that rolls along a shape does not slip on it",
         reference=np.zeros(8),
         atol=1e-15,
         why="rounding of differences of 1e-3",

@@ -1,17 +1,17 @@
-"""Critical (hunting) speeds found by the engine, beside eigenvalues of the linearised vehicle on a rigid track.
+"""Critical (hunting) speeds found by the engine, compared with eigenvalues of the linearised vehicle on a rigid track.
 
 Search: a smooth track with one bump of the alignment, then 6 s of running; the train hunts if the lateral motion of
 its wheelsets in the last second and a half is no smaller than in the one before (or if it derails). The speed is
-bisected between 100 and 600 km/h; 600 means that no hunting was found, and 1000 km/h was tried too. A kick of one size
-finds one attractor: H. True, Vehicle System Dynamics 51(3) (2013) 443-459 tells what such a search can miss. Numbers
-are therefore for information, and only the trends are judged.
+bisected between 100 and 600 km/h; 600 means that no hunting was found, and 1000 km/h was tried as well. A disturbance
+of one size finds one attractor; H. True, Vehicle System Dynamics 51(3) (2013) 443-459, shows what such a search can
+miss. The numbers are therefore for information, and only the trends are judged.
 
-Coarse on purpose: hunting is at 1 to 8 Hz, and its waves are 10 m and longer, so that the rails enter by their static
-compliance only: one mode per metre, a window of 2 m or more beyond the outer wheels, steps of 0.4 ms (a sixtieth of a
-radian of 8 Hz; its square is the error).
+The numerics are coarse on purpose: hunting is at 1 to 8 Hz, and its waves are 10 m and longer, so that the rails enter
+by their static compliance only: one mode per metre, a window of 2 m or more beyond the outer wheels, steps of 0.4 ms
+(a sixtieth of a radian at 8 Hz; the error is its square).
 
-Pairs: LMA on CHN60 as the Chinese vehicles run (tape circles 1493 mm apart), and S1002 on 60E1 with tape circles
-1500 mm apart, for which EN 15302 gives its conicity of 0.18 at 3 mm; at 1493 mm the same pair has 0.017.
+Pairs of profiles: LMA on CHN60 as used by the Chinese vehicles (tape circles 1493 mm apart), and S1002 on 60E1 with
+tape circles 1500 mm apart, for which EN 15302 gives its conicity of 0.18 at 3 mm; at 1493 mm the same pair has 0.017.
 No published critical speed was found for these data sheets with these profiles.
 """
 
@@ -40,17 +40,17 @@ from validation.frame.case import Case
 __all__ = ["CASES", "Setting", "critical_speed"]
 
 SLOWEST, FASTEST, TOP, STEP = 100.0, 600.0, 1000.0, 10.0  # km/h
-DURATION, SPAN = 6.0, 1.5  # s: of a run, of either half of what is judged
-KEPT = 0.95  # share of the motion that must be left from one span to the next: decay of less than 0.03 /s
-VISIBLE = 1e-4  # m: below this a motion counts as gone
-BUMP, BUMP_START, BUMP_LENGTH = 6e-3, 30.0, 20.0  # m: a flange's play high, wavelength of hunting long
+DURATION, SPAN = 6.0, 1.5  # s: duration of a run, and of either half of the time that is judged
+KEPT = 0.95  # least ratio of the motion of one span to that of the span before: decay of less than 0.03 /s
+VISIBLE = 1e-4  # m: below this a motion counts as decayed
+BUMP, BUMP_START, BUMP_LENGTH = 6e-3, 30.0, 20.0  # m: the flange clearance high, a hunting wave long
 COARSE = (
     "numerics.window=26.0",
     "numerics.modes_per_metre=1.0",
     "numerics.time_step=4e-4",
     "output.body_interval=0.004",
 )
-WEAK = {  # 1 N s/m is left of the yaw dampers
+WEAK = {  # the yaw dampers keep 1 N s/m
     "CRH380A_v2": ("v=[0.0]", "c=[1.0]"),
     "CRH380A_v6": ("v=[0.0]", "c=[1.0]"),
     "Zhai_coach": ("v=[0.0, 1.0]", "F=[0.0, 1.0]"),
@@ -62,7 +62,7 @@ EUROPE = (
     "train.vehicles.0.geometry.half_span_contact=0.75",
 )
 SMALL_MOTION = 0.7  # 1/s: 3 % of the eigenvalue 2.9 + 23 i
-AMPLITUDE = 3e-3  # m: of the equivalent conicity, as EN 15302 has it
+AMPLITUDE = 3e-3  # m: amplitude of the equivalent conicity, as in EN 15302
 
 
 @dataclass(frozen=True)
@@ -72,19 +72,21 @@ class Setting:
     Attributes:
         vehicle: Preset.
         contact: Overrides of the profiles.
-        without_dampers: Whether the yaw dampers are taken off.
+        without_dampers: Whether the yaw dampers are removed.
+        series: Whether all springs in series with dampers are modelled; else as the preset states.
     """
 
     vehicle: str
     contact: tuple[str, ...] = CHINA
     without_dampers: bool = False
+    series: bool = True
 
     @property
     def overrides(self) -> tuple[str, ...]:
         """Changes of the built-in scenario "smooth"."""
         weak = WEAK[self.vehicle] if self.without_dampers else ()
         dampers = tuple(f"train.vehicles.0.yaw_damper.{key}" for key in weak)
-        vehicle = (f'train.vehicles=["{self.vehicle}"]', "train.series_springs=true")
+        vehicle = (f'train.vehicles=["{self.vehicle}"]', f"train.series_springs={str(self.series).lower()}")
         return (*vehicle, *self.contact, *dampers)
 
 
@@ -103,7 +105,7 @@ def amplitudes(scenario: Scenario) -> Reals:
 
 
 def hunts(setting: Setting, kmh: float) -> bool:
-    """Whether a limit cycle, or a derailment, is left of a bump at a speed [km/h]."""
+    """Whether a bump leads to a limit cycle or a derailment at a speed [km/h]."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "bump.csv"
         write_kick(file, BUMP_START, BUMP_LENGTH, BUMP)
@@ -145,6 +147,7 @@ def linear(setting: Setting) -> tuple[float, float]:
 
 
 DELIVERED = tuple(Setting(name) for name in ("CRH380A_v2", "CRH380A_v6", "Zhai_coach"))
+SHIPPED = tuple(Setting(name, series=False) for name in ("CRH2", "CRH380A_v2", "CRH380A_v6", "Zhai_coach"))
 WITHOUT = tuple(Setting(setting.vehicle, without_dampers=True) for setting in DELIVERED)
 CONICITY = tuple(
     (Setting(*given), Setting(given[0], EUROPE, given[2]))
@@ -155,7 +158,7 @@ MANCHESTER = Setting("Manchester", EUROPE)
 
 @cache
 def small_motion() -> tuple[complex, complex]:
-    """Growth and circular frequency [1/s] of a CRH2 on cones of 1:20 after a kick of 0.02 mm: engine, linear."""
+    """Growth and circular frequency [1/s] of a CRH2 on cones of 1:20 after a bump of 0.02 mm: engine, linear."""
     kmh, seconds, kick = 500.0, 1.5, 2e-5
     seats = {"like": "ACE2021", "vertical_stiffness": 3e8, "lateral_stiffness": 3e8}
     tables: dict[str, Any] = {
@@ -185,7 +188,7 @@ def small_motion() -> tuple[complex, complex]:
 
 
 def _finite(speeds: list[float]) -> Reals:
-    """Speeds with those that were not found blank."""
+    """Speeds, NaN where none was found."""
     return np.where(np.isinf(speeds), np.nan, speeds)
 
 
@@ -197,8 +200,8 @@ def _row(name: str, words: str, settings: tuple[Setting, ...]) -> Case:
         source="eigenvalues of the linearised vehicle (closed_forms/linear_vehicle)",
         reference=lambda: _finite([linear(setting)[1] for setting in settings]),
         why=(
-            "-: none up to 1000; a kick of 6 mm feels the conicity near the flange and the dampers' blow-off, which a"
-            " linear vehicle does not have"
+            "-: none up to 1000; a bump of 6 mm involves the conicity near the flange and the dampers' blow-off,"
+            " which the linear vehicle does not have"
         ),
         compute=lambda: _finite([critical_speed(setting) for setting in settings]),
         quick=False,
@@ -209,13 +212,13 @@ CASES = (
     Case(
         name="hunting-small-motion",
         kind="verification",
-        quantity="CRH2 on cones of 1:20 at 500 km/h, kick of 0.02 mm, stiff track: growth and circular frequency [1/s]",
+        quantity="CRH2 on cones of 1:20 at 500 km/h, bump of 0.02 mm, stiff track: growth and circular frequency [1/s]",
         source="eigenvalue of the linearised vehicle on rigid rails (closed_forms/linear_vehicle)",
         reference=lambda: [small_motion()[1].real, small_motion()[1].imag],
         atol=SMALL_MOTION,
         why=(
-            "3 % of the eigenvalue: spin creep of 0.04 of the load takes 1.3 to 2.6 % off the creep coefficients, the"
-            " rails give a little, front and rear bogie beat"
+            "3 % of the eigenvalue: spin creep of 0.04 of the load lowers the creep coefficients by 1.3 to 2.6 %,"
+            " the rails deflect a little, front and rear bogie beat"
         ),
         compute=lambda: [small_motion()[0].real, small_motion()[0].imag],
     ),
@@ -227,7 +230,7 @@ CASES = (
             source="with its yaw dampers, less 20 km/h",
             reference=lambda kept=kept: min(critical_speed(kept), TOP) - 2.0 * STEP,
             rule="at most",
-            why="a bound: yaw dampers are there to raise it; both speeds are known to 10 km/h",
+            why="a bound: yaw dampers raise it; both speeds are known to 10 km/h",
             compute=lambda lost=lost: critical_speed(lost),
             quick=False,
         )
@@ -244,7 +247,7 @@ CASES = (
             source="on LMA/CHN60, conicity 0.035, less 20 km/h",
             reference=lambda low=low: critical_speed(low) - 2.0 * STEP,
             rule="at most",
-            why="a bound: it falls as conicity grows; both speeds are known to 10 km/h",
+            why="a bound: it falls with growing conicity; both speeds are known to 10 km/h",
             compute=lambda high=high: critical_speed(high),
             quick=False,
         )
@@ -262,6 +265,7 @@ CASES = (
         quick=False,
     ),
     _row("hunting-delivered", ", ".join(setting.vehicle for setting in DELIVERED) + " on LMA/CHN60", DELIVERED),
+    _row("hunting-shipped", ", ".join(setting.vehicle for setting in SHIPPED) + " as shipped", SHIPPED),
     _row("hunting-no-yaw-dampers", "the same without yaw dampers", WITHOUT),
     _row("hunting-LMA", "CRH2 and CRH380A_v6 without yaw dampers on LMA/CHN60", tuple(low for low, _ in CONICITY)),
     _row("hunting-S1002", "the same on S1002/60E1, and Manchester", (*(high for _, high in CONICITY), MANCHESTER)),

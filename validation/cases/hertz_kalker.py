@@ -5,7 +5,7 @@ recomputed with elliptic integrals by an independent calculation; the same calcu
 wheel of 0.43 m under 70 kN; J. J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990),
 table E3, as coded in CONTACT (Apache-2.0), src/m_hertz.f90; Z. Y. Shen, J. K. Hedrick, J. A. Elkins,
 8th IAVSD (1983) 591-605; CONTACT's reference output of the Manchester benchmark (see ``manchester``), of
-which its normal forces and creepages are taken here and its tangential forces compared.
+which the normal forces and creepages are used here and the tangential forces are compared.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ HERTZ_TABLE = {
     70: (1.2851, 0.79990, 0.97264), 75: (1.2020, 0.84481, 0.98468), 80: (1.1278, 0.89272, 0.99321),
     85: (1.0609, 0.94422, 0.99831), 90: (1.0, 1.0, 1.0),
 }  # fmt: skip
-"""m, n, r by the angle beta in degrees."""
+"""m, n, r over the angle beta in degrees."""
 WHEELS = {
     "cone on R300": ((np.inf, 0.3), (4.954, 6.19, 4.87, 84.2, 1.25)),
     "hollow R450 on R300": ((-0.45, 0.3), (4.102, 5.13, 8.39, 69.7, 1.51)),
@@ -59,9 +59,9 @@ LONG = (  # nu = 0.25, b/a = RATIOS
 
 
 CREEP = np.stack([REFERENCE["Fx"], REFERENCE["Fs"]], axis=1) / (0.3 * REFERENCE["Fn"][:, None])
-"""CONTACT's creep forces along and across over mu N."""
+"""CONTACT's longitudinal and lateral creep forces over mu N."""
 FLANK = 13  # first of its rows on the flank
-FULL_THEORY = f"{CONTACT}, full theory, its normal forces and creepages given"
+FULL_THEORY = f"{CONTACT}, full theory, with its normal forces and creepages prescribed"
 SHEN = "a Hertzian ellipse, linear coefficients and one saturation for all creepages: 10 % of mu N is usual"
 TABLE = {  # nu = 0 and 0.5: rows as above
     0.0: (
@@ -124,11 +124,11 @@ SIDEWAYS = np.geomspace(1e-3, 3.0, 12)  # m/s of a wheelset that slides at 350 k
 
 
 def _sliding() -> tuple[Reals, Reals]:
-    """Creep force T' of the kernel and by hand from its N, creepages and coefficients [N], shape (24,)."""
+    """Creep force T' of the kernel, and calculated from its N, creepages and coefficients [N], shape (24,)."""
     model, V = paper_model(), 350.0 / 3.6
     wheelsets = len(model.wheel)
     u = np.zeros((len(SIDEWAYS), wheelsets, 5))
-    u[..., 1] = 1e-4  # pressed 0.1 mm into the rail: some 80 kN
+    u[..., 1] = 1e-4  # pressed 0.1 mm into the rail: about 80 kN
     v = np.zeros_like(u)
     v[..., 0] = SIDEWAYS[:, None]
     smooth = np.zeros((1, wheelsets, at.N_IRREGULARITY))
@@ -189,8 +189,8 @@ CASES = (
     Case(
         name="hertz-zhai",
         kind="validation",
-        quantity="Zhai's G for R = 0.43 m, cone and worn [1e-8 m/N^(2/3)]",
-        source="4.57 R^-0.149, 3.86 R^-0.115, by hand",
+        quantity="Zhai's G for R = 0.43 m, coned and worn wheel [1e-8 m/N^(2/3)]",
+        source="4.57 R^-0.149, 3.86 R^-0.115, calculated by hand",
         reference=(5.182, 4.253),
         atol=5e-4,
         why="printed digits",
@@ -213,7 +213,7 @@ CASES = (
         name="kalker-steel",
         kind="verification",
         quantity="C11, C22, C23, C33 at nu = 0.3, a/b = 1",
-        source="quadratic in 1/C through nu = 0, 0.25, 0.5, by hand",
+        source="quadratic in 1/C through nu = 0, 0.25, 0.5, calculated by hand",
         reference=_steel,
         rtol=1e-12,
         why="rounding",
@@ -242,7 +242,9 @@ CASES = (
     Case(
         name="contact-creep-tread",
         kind="validation",
-        quantity="creep forces along and across over mu N, Manchester wheelset on tread and flange root, 0 to 6 mm",
+        quantity=(
+            "longitudinal and lateral creep forces over mu N, Manchester wheelset on tread and flange root, 0 to 6 mm"
+        ),
         source=FULL_THEORY,
         reference=CREEP[:FLANK],
         atol=0.1,
@@ -262,11 +264,14 @@ CASES = (
     Case(
         name="contact-creep-flank-parts",
         kind="validation",
-        quantity="its parts along (eight), then across (eight)",
+        quantity="its longitudinal parts (eight), then its lateral parts (eight)",
         source=FULL_THEORY,
         reference=CREEP[FLANK:].T,
         atol=0.105,
-        why="about 10 %, to two digits: at tau > 40 spin turns the full theory's force, which one saturation does not",
+        why=(
+            "about 10 %, to two digits: at tau > 40 spin turns the direction of the full theory's force, which a"
+            " common saturation does not do"
+        ),
         compute=lambda: _beside_contact()[FLANK:].T,
     ),
 )

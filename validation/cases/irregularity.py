@@ -38,7 +38,7 @@ def _sigmas(name: str, low: float, high: float, channels: tuple[str, ...] = ORDE
 
 @cache
 def _sample() -> Reals:
-    """Standard deviations over 20 km of the German low spectrum, seed 1, the taper far behind [mm, mrad]."""
+    """Standard deviations over 20 km of the German low spectrum, seed 1, far beyond the taper [mm, mrad]."""
     x = np.arange(0.0, LENGTH, SPACING)
     values = make_irregularity(IrregularityParams(), -1e9).sample(x)[:, :4]
     found = dict(zip(CHANNELS, 1e3 * np.sqrt(np.mean(values**2, axis=0)), strict=True))
@@ -64,17 +64,17 @@ CASES = (
         source=INDEPENDENT,
         reference=tuple(LOW.values()),
         atol=1e-3,
-        why="a unit of the last printed digit: its quadrature",
+        why="a unit of the last printed digit, the error of the source's quadrature",
         compute=lambda: [_sigmas("german_low", *band) for band in LOW],
     ),
     Case(
         name="sigma-german-high",
         kind="validation",
-        quantity="German high, 1-120 m: the same",
+        quantity="German high, the same quantities, 1-120 m",
         source=INDEPENDENT,
         reference=HIGH,
         atol=1e-3,
-        why="a unit of the last printed digit: its quadrature",
+        why="a unit of the last printed digit, the error of the source's quadrature",
         compute=lambda: _sigmas("german_high", 1.0, 120.0),
     ),
     Case(
@@ -84,13 +84,13 @@ CASES = (
         source=INDEPENDENT,
         reference=CHINA,
         atol=1e-3,
-        why="a unit of the last printed digit: its quadrature",
+        why="a unit of the last printed digit, the error of the source's quadrature",
         compute=lambda: _sigmas("china_ballastless", 2.0, 120.0, ORDER[:3]),
     ),
     Case(
         name="sigma-20-km",
         kind="validation",
-        quantity="realisation of German low over 20 km, seed 1: the same four",
+        quantity="realisation of German low over 20 km, seed 1, the same four quantities",
         source=INDEPENDENT,
         reference=LOW[1.0, 120.0],
         atol=_scatter(),

@@ -1,19 +1,19 @@
-"""Klingel's wavelength: conical wheels kicked once and left alone, free or held square in a rigid bogie, at 30 km/h.
+"""Klingel's wavelength: conical wheels after a single disturbance, free or held square in a rigid bogie, at 30 km/h.
 
 References: ``closed_forms/klingel``. A car on two wheelsets 2.5 m apart carries 12 t a wheelset; vertical springs of
-1e6 N/m stand between them, and longitudinal and lateral ones at the axles' height of 1 N/m (each wheelset runs as if
-alone) or 1e9 N/m (a rigid bogie). Wheels are cones of 1:40 or 1:20, railheads round with 300 mm, inclined 1:40,
+1e6 N/m connect them, and at the axles' height longitudinal and lateral springs of 1 N/m (each wheelset runs
+independently) or 1e9 N/m (a rigid bogie). Wheels are cones of 1:40 or 1:20, railheads round with 300 mm, inclined 1:40,
 friction 1 so that spin creep does not saturate.
 
-What shifts the wavelength. Inertia (V^2 m/(2 f22) times the wave number k = 2 pi/L: 0.002 at 30 km/h), the stiffness
-of the contact angles (2 N delta/(b 2 f22 k): 0.001), spin (f23 k/f11: 0.001) and, in the bogie, the rails' give (f22 k
-over their lateral stiffness of some 2.5e7 N/m: 0.07) enter as odd powers of k: they damp or feed the wave, and change
-its length by their squares, less than 1e-4 (rails: 2e-3). What is left for the free wheelset are terms of second order
-in the cone's slope delta, since the contact's kinematics are of first order in the angles: tolerance delta^2.
-In the bogie creep is not zero. With the roll phi = -delta y/b the slip across is that of the contacts, y' (1 + r
-delta/b), and its force works with the same lever: f22 grows by up to 2 r delta/b, less what spin takes back as the
-loads of left and right change (f23 delta/(N b)); saturation lowers f22 against f11 by (spin 0.8 delta + creep 0.01)/3.
-The wavelength takes half of the share a^2 f22/(b^2 f11 + a^2 f22) = 0.71 of the largest of them, r delta/b.
+Effects on the wavelength. Inertia (V^2 m/(2 f22) times the wave number k = 2 pi/L: 0.002 at 30 km/h), the stiffness of
+the contact angles (2 N delta/(b 2 f22 k): 0.001), spin (f23 k/f11: 0.001) and, in the bogie, the rails' compliance
+(f22 k over their lateral stiffness of about 2.5e7 N/m: 0.07) enter as odd powers of k: they damp or excite the wave,
+and change its length by their squares, less than 1e-4 (rails: 2e-3). For the free wheelset there remain terms of
+second order in the cone's slope delta, since the contact's kinematics are of first order in the angles: tolerance
+delta^2. In the bogie creep is not zero. With the roll phi = -delta y/b the lateral slip is that of the contacts, y' (1
++ r delta/b), and its force has the same lever: f22 grows by up to 2 r delta/b, less the effect of spin as the loads of
+left and right change (f23 delta/(N b)); saturation lowers f22 against f11 by (spin 0.8 delta + creep 0.01)/3. The
+wavelength takes half of the share a^2 f22/(b^2 f11 + a^2 f22) = 0.71 of the largest of them, r delta/b.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def cone(slope: float) -> dict[str, Any]:
 
 
 def _wagon(guidance: float) -> dict[str, Any]:
-    """A car on two wheelsets; the guidance [N/m] is that of an axle box, along and across."""
+    """A car on two wheelsets; the guidance [N/m] is that of an axle box, longitudinally and laterally."""
     axles = ((f"wheelset {i + 1}", sign * HALF_WHEELBASE) for i, sign in enumerate((1.0, -1.0)))
     body = [{"name": "car", "mass": 20e3, "Jx": 2e4, "Jy": 2e4, "Jz": 2e4, "height": AXLE}]
     inertia = {"mass": 1850.0, "Jx": 967.0, "Jy": 123.0, "Jz": 967.0, "height": AXLE, "wheelset": True}
@@ -102,7 +102,7 @@ def _scenario(slope: float, guidance: float, distance: float, kick: Path | None)
 
 @dataclass(frozen=True)
 class Wave:
-    """What a run left, and what the closed form says.
+    """Wavelengths of a run and of the closed form.
 
     Attributes:
         measured: Wavelength of wheelset 1 [m].
@@ -115,7 +115,7 @@ class Wave:
 
 @cache
 def wave(slope: float, guidance: float) -> Wave:
-    """Run cones of a slope with a guidance [N/m] and measure their wave."""
+    """Run cones of a slope with a guidance [N/m] and measure their wavelength."""
     kicked = KICK_START + KICK_LENGTH + 2.0 * HALF_WHEELBASE
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "kick.csv"
@@ -131,7 +131,7 @@ def wave(slope: float, guidance: float) -> Wave:
 
 
 def _exact(slope: float, guidance: float) -> float:
-    """Klingel's wavelength with the contact's place, and Kalker's ratio of creep coefficients at the static load."""
+    """Klingel's wavelength at the contacts' position, and Kalker's ratio of creep coefficients at the static load."""
     scenario = _scenario(slope, guidance, 100.0, None)
     table = ingredients(scenario, 1e-3).contact
     at = WheelRailPair(scenario.parts.wheel, scenario.parts.rail_profile, table.settings).contacts(0.0, 0.0)
@@ -148,7 +148,7 @@ def fit_wave(x: Reals, y: Reals, guess: complex) -> complex:
     """Fit exp(g x) (A cos kx + B sin kx) + C + D x by least squares.
 
     Args:
-        x: Way or time, shape (n,).
+        x: Distance or time, shape (n,).
         y: Motion, shape (n,).
         guess: g + i k to start from, per unit of x.
 
@@ -186,7 +186,7 @@ def _case(slope: float, guidance: float) -> Case:
         source="Klingel 1883" + ("" if free else "; with Kalker's f22/f11") + "; roll of the axle after Wickens 2003",
         reference=lambda: wave(slope, guidance).exact,
         rtol=slope**2 if free else 0.71 * 0.43 * slope / 0.75,
-        why="second order in the slope of the cone" if free else "slip across and its lever: 0.71 r delta/b",
+        why="second order in the slope of the cone" if free else "lateral slip and its lever: 0.71 r delta/b",
         compute=lambda: wave(slope, guidance).measured,
         quick=free and slope == SLOPES[-1],
     )

@@ -4,18 +4,18 @@ Iwnicki (ed.), The Manchester benchmarks for rail vehicle simulation (1999); ref
 profiles of the repository eve70a/CONTACT (Apache-2.0), see the heads of the files in ``data``. Frame: y
 right, z down; CONTACT's angle is negative where the rail falls inward.
 
-The yaw there grows to 24 mrad. A yawed wheel seen along the rail is the envelope of its circles (the
+The yaw in this case grows to 24 mrad. A yawed wheel seen along the rail is the envelope of its circles (the
 trace line): station s appears at s cos(psi) - r r' tan(psi) sin(psi) and height sqrt(1 - r'^2
-tan^2(psi)) r, exactly, with the touching point r r' tan(psi) ahead of the axle. The engine leaves that
-second-order effect out (yaw of a running wheelset is below 5 mrad: 0.03 mm at the flange); here the
-envelope is put in the wheel's place, so that the rest can be compared closely. At 10 mm shift it moves
+tan^2(psi)) r, exactly, with the touching point r r' tan(psi) ahead of the axle. The engine omits this
+second-order effect (yaw of a running wheelset is below 5 mrad: 0.03 mm at the flange); here the
+envelope replaces the wheel, so that the rest can be compared closely. At 10 mm shift it moves
 the contact by 0.18 mm on the wheel and u by 0.22 mm.
 
 CONTACT's contact point is not the point of least gap but the centre of gravity of the interpenetration,
 weighted by the square of its depth (found by trying powers: with depth^2.5 over y, which is depth^2
 over the area, all rows fit; 1.5 and 3 do not). Both are compared.
 
-Left out: the angle and the unweighted station of rows 0 to 2 and 10 to 12, where the two definitions of
+Omitted: the angle and the unweighted station of rows 0 to 2 and 10 to 12, where the two definitions of
 the point differ by up to 2.5 mm (jump at 0.2 mm, patches of 15 mm; flange root); the radius of rows 0,
 1, 10 and the approach of rows 0, 1, 10 (9 to 30 %), where the gap has two minima within one patch;
 CONTACT's tangential forces, which are of its full theory.
@@ -67,7 +67,7 @@ def placed(row: int) -> tuple[WheelRailPair, float]:
 
 @cache
 def located(row: int) -> tuple[float, float, float, float]:
-    """Station of least gap, CONTACT's weighted one, contact angle, how far ahead the wheel touches."""
+    """Station of least gap, CONTACT's weighted station, contact angle, distance of the contact ahead of the axle."""
     case = REFERENCE[row]
     roll, yaw = case["roll_ws"], case["yaw_ws"]
     station = envelope(yaw)[1]
@@ -134,7 +134,7 @@ CASES = (
         source=CONTACT,
         reference=_column("ycp_w", ALL_BUT_JUMP),
         atol=0.010,
-        why="CONTACT's grid of 0.2 mm and its splines",
+        why="CONTACT's grid of 0.2 mm, and its splines",
         compute=lambda: [1e3 * located(row)[1] for row in ALL_BUT_JUMP],
     ),
     Case(
@@ -144,7 +144,7 @@ CASES = (
         source=CONTACT,
         reference=_column("ycp_w", (10,)),
         atol=0.05,
-        why="0.5 % of the 10 mm between the two regions",
+        why="0.5 % of the distance of 10 mm between the two regions",
         compute=lambda: [1e3 * located(10)[1]],
     ),
     Case(
@@ -154,7 +154,7 @@ CASES = (
         source=CONTACT,
         reference=_column("ycp_w", TREAD),
         atol=0.1,
-        why="1 % of the patch: CONTACT's point is a weighted centre",
+        why="1 % of the patch, since CONTACT's point is a weighted centre",
         compute=lambda: [1e3 * located(row)[0] for row in TREAD],
     ),
     Case(
@@ -164,7 +164,7 @@ CASES = (
         source=CONTACT,
         reference=_column("ycp_w", FLANK),
         atol=0.005,
-        why="patches of 1 mm: the definitions of the point meet",
+        why="patches of 1 mm, for which both definitions of the point agree",
         compute=lambda: [1e3 * located(row)[0] for row in FLANK],
     ),
     Case(
@@ -194,7 +194,7 @@ CASES = (
         source=CONTACT,
         reference=_column("zcp_w", WITH_RADIUS),
         atol=0.012,
-        why="the depth at a weighted point is not the largest",
+        why="the depth at a weighted point is not the largest depth",
         compute=lambda: [1e3 * radius(row) for row in WITH_RADIUS],
     ),
     *(

@@ -1,4 +1,4 @@
-"""A constant load at 350 km/h on a continuous foundation: the window against the endless beam.
+"""A constant load at 350 km/h on a continuous foundation: the window against the infinite beam.
 
 References: closed form by residues (``closed_forms/timoshenko``); see L. Fryba, Vibration of solids and
 structures under moving loads (3rd ed., 1999), ch. 13, for the method.
@@ -20,7 +20,7 @@ from validation.frame.case import Case
 LENGTH, V, LOAD = 36.0, 350.0 / 3.6, 70e3
 K, C = 4e7 / 0.63, 5e4 / 0.63  # the paper's fastening, smeared
 PLACES = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])  # m ahead of the load
-SOURCE = "endless Timoshenko beam, residues of its Fourier transform"
+SOURCE = "infinite Timoshenko beam, residues of its Fourier transform"
 
 
 @cache
@@ -28,7 +28,7 @@ def _window(modes: int) -> Reals:
     """Deflection of the window around a steady load at its middle [mm]: d/dt = 0 in the moving frame."""
     window = RailWindow(load_scenario("paper").parts.rail, LENGTH, modes)
     A = window.vertical(V)[2].toarray()
-    # Galerkin on k w - c V w', with int W_i W_j' by quadrature, apart from the engine's closed form
+    # Galerkin on k w - c V w', with int W_i W_j' by quadrature, independent of the engine's closed form
     x, weight = np.polynomial.legendre.leggauss(2 * modes + 40)
     s = 0.5 * LENGTH * (x + 1.0)
     flow = window.shape(s).T @ (0.5 * LENGTH * weight[:, None] * window.shape_slope(s))
@@ -45,7 +45,7 @@ def _exact() -> Reals:
 
 
 def _missing(modes: int) -> float:
-    """What the modes left out would add under the load [mm]."""
+    """Deflection of the omitted modes under the load [mm]."""
     return 1e3 * LOAD * static_missing_share(vertical_beam(), LENGTH, modes)
 
 
@@ -63,7 +63,7 @@ CASES = (
             source=SOURCE,
             reference=_exact,
             atol=lambda_atol,
-            why="1.1 times the static compliance of the modes left out",
+            why="1.1 times the static compliance of the omitted modes",
             compute=lambda modes=modes: _window(modes),
         )
         for modes, lambda_atol in ((modes, 1.1 * _missing(modes)) for modes in (60, 120, 240, 480))
@@ -71,8 +71,8 @@ CASES = (
     Case(
         name="moving-load-convergence",
         kind="convergence",
-        quantity="what is missing under the load with 120, 240, 480 modes [um]",
-        source=("static compliance of the modes left out: 2/l times the sum of 1/(kGA k^2) + 1/(EI k^4), of order 1/N"),
+        quantity="missing deflection under the load with 120, 240, 480 modes [um]",
+        source=("static compliance of the omitted modes: 2/l times the sum of 1/(kGA k^2) + 1/(EI k^4), of order 1/N"),
         reference=lambda: [1e3 * _missing(modes) for modes in (120, 240, 480)],
         rtol=0.01,
         why="the foundation's share in modes beyond 120: k / (kGA k_i^2) < 1 %",

@@ -2,18 +2,18 @@
 
 Reference: ``closed_forms/floquet``. CHN60, fastening ACE2021 (4e7 N/m, 5e4 N s/m) every 0.65 m, rigid ground, 70 kN
 at 100, 250 and 350 km/h. Ours is the engine's own step, all of it: rail kernels, fastening kernel, passes, inverses.
-What a user's run has besides is put out of reach: the slabs of the window are placed behind it, beyond which the
-engine takes the ground as rigid; the track is 1 m lower than the wheels, which carry no weight and stay in the air;
+Everything else of a run is excluded: the slabs are placed behind the window, and beyond them the
+engine takes the ground as rigid; the track is 1 m lower than the wheels, which carry no weight and do not touch it;
 the load is added to the left rail's right-hand side in the middle of the window. The load grows over 3 m, another 3 m
 pass, then one pitch is compared: all seats within 10 m of the load together give the history of one seat.
 
-What can be asked of a sum of sines. The exact history jumps down by 3 % of its peak when the load crosses a seat
+Accuracy of a sum of sines. The exact history jumps down by 3 % of its peak when the load crosses a seat
 (``floquet.jump``), since the rail's slope has a kink under a point load and the seat's damper feels V w'. A truncated
 series runs through a jump over l / 2N on either side and overshoots by 9 % of it (Gibbs) beyond, at any number of
-modes. The history is therefore compared while the load is l / 2N or more from every seat (neighbours hear of the
-jump, too); the largest difference anywhere, which tends to half the jump, is listed for information. The deflection
-under the load is continuous and is compared over the whole pitch; it lacks the compliance of the modes left
-out, which falls as 1/N: 8 modes a metre leave 0.6 %, hence 12 a metre for the rows that are judged.
+modes. The history is therefore compared while the load is l / 2N or more from every seat (the jump reaches the
+neighbours, too); the largest difference anywhere, which tends to half the jump, is listed for information. The
+deflection under the load is continuous and is compared over the whole pitch; it lacks the compliance of the omitted
+modes, which falls as 1/N: 8 modes per metre leave 0.6 %, hence 12 a metre for the rows that are judged.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ from tiengine.engine.sine_stepper import SineStepper
 from tiengine.engine.stepper import Stage
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
-from tiengine.model.model import Ingredients, Model, build_model
+from tiengine.model.ingredients import Ingredients
 from tiengine.model.newmark import Newmark
+from tiengine.model.sine_model import SineModel, build_sine_model
 from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import RailWindow
@@ -47,14 +48,14 @@ RAMP, SETTLE = 3.0, 3.0  # m
 SPEEDS = (350, 250, 100)  # km/h
 LADDER = (60, 72, 144, 288, 432)  # modes in 36 m
 CONVERGED = (24.0, 288)  # window [m] and modes: 12 a metre, as 432 in 36 m
-DEFAULT = (28.0, 182, 2e-4)  # what a default scenario has: window [m], modes, step [s]
-SOURCE = "endless Timoshenko rail on discrete springs, Floquet transform"
+DEFAULT = (28.0, 182, 2e-4)  # of a default scenario: window [m], modes, step [s]
+SOURCE = "infinite Timoshenko rail on discrete springs, Floquet transform"
 
 
 class _Loaded(SineStepper):
     """The engine's step with a load in the middle of the left rail, added to what its forces have left in F."""
 
-    def __init__(self, model: Model, state: SineState, chunk: Chunk) -> None:
+    def __init__(self, model: SineModel, state: SineState, chunk: Chunk) -> None:
         self.weight = 0.0
         self._shape = model.window.shape(np.array([model.ingredients.length / 2.0]))[0]
         super().__init__(model, state, chunk)
@@ -97,14 +98,14 @@ def _seats() -> Seats:
     return Seats(given.slab.fastening_pitch, given.fastening.vertical_stiffness, given.fastening.vertical_damping)
 
 
-def _prepare(model: Model, V: float, steps: int) -> tuple[SineState, Chunk, _Loaded, Reals]:
+def _prepare(model: SineModel, V: float, steps: int) -> tuple[SineState, Chunk, _Loaded, Reals]:
     """Weightless wheels over a lowered track, slabs far behind; window's rear end at every step."""
     model.vehicle_load[:] = 0.0
     state, chunk = SineState.at_rest(model), Chunk.empty(model.ingredients, steps, 1, 1)
     stepper = _Loaded(model, state, chunk)
     felt = np.zeros_like(chunk.irregularity)
     felt[..., at.Z_V] = 1.0
-    X = V * model.ingredients.newmark.dt * np.arange(1, steps + 1)
+    X = V * model.ingredients.newmark.dt * np.arange(1.0, steps + 1)
     stepper.load(X, np.full(steps, V), np.zeros(steps), felt)
     chunk.clock[:, at.FIRST_SLAB] = -1000
     return state, chunk, stepper, X
@@ -112,7 +113,7 @@ def _prepare(model: Model, V: float, steps: int) -> tuple[SineState, Chunk, _Loa
 
 @cache
 def history(speed: int, length: float, modes: int, dt: float = 1e-4) -> History:
-    """March the engine.
+    """Advance the engine.
 
     Args:
         speed: [km/h].
@@ -121,7 +122,7 @@ def history(speed: int, length: float, modes: int, dt: float = 1e-4) -> History:
         dt: Step [s].
     """
     V, d = speed / 3.6, _seats().pitch
-    model = build_model(replace(_ingredients(), newmark=Newmark(dt), length=length, modes=modes), V)
+    model = build_sine_model(replace(_ingredients(), newmark=Newmark(dt), length=length, modes=modes), V)
     steps, last = (int(np.ceil(way / (V * dt))) for way in (RAMP + SETTLE + d, d))
     state, chunk, stepper, X = _prepare(model, V, steps)
     shape = model.window.shape(np.array([length / 2.0]))[0]
@@ -157,7 +158,7 @@ def _largest_deflection(speed: int) -> float:
 
 
 def exact_force(speed: int, x: Reals) -> Reals:
-    """Force of a seat at ``speed`` [km/h] by the load's place x ahead of it [m], shape of x [N]."""
+    """Force of a seat at ``speed`` [km/h] over the load's distance x ahead of it [m], shape of x [N]."""
     return seat_force(vertical_beam(), _seats(), speed / 3.6, LOAD, x)
 
 
@@ -194,15 +195,15 @@ def _orders() -> list[float]:
 
 
 def _everything(length: float, modes: int, dt: float) -> list[float]:
-    """Errors at 350 km/h: seat force beside the jumps and anywhere; deflection, largest, mean, mean when corrected."""
+    """Errors at 350 km/h: seat force off the jumps and anywhere; deflection, largest, mean, mean when corrected."""
     forces = [force_error(350, length, modes, dt, apart) for apart in (0.0625, 0.0)]
     largest, mean = deflection_error(350, length, modes, dt)
     missing = LOAD * RailWindow(_ingredients().rail, length, modes).missing_compliance[0]
     return [*forces, largest, mean, mean + 100.0 * missing / _largest_deflection(350)]
 
 
-_JUMPS = "0.5 % is what the issue asks; Gibbs' 9 % of the jump (3 % of the peak) is 0.27 % of it"
-_MISSING = "0.5 % is what the issue asks; the compliance of the modes left out, under load and at seats, is 0.3 %"
+_JUMPS = "required bound; Gibbs' 9 % of the jump (3 % of the peak) is 0.27 % of the peak"
+_MISSING = "required bound; the compliance of the omitted modes, under load and at seats, is 0.3 %"
 
 CASES = (
     *(
@@ -232,7 +233,7 @@ CASES = (
         name="floquet-order",
         kind="convergence",
         quantity="order in 1/N of the mean deflection under the load, 144 to 288 modes in 36 m, 350 km/h",
-        source="compliance of the modes left out",
+        source="compliance of the omitted modes",
         reference=1.0,
         atol=0.1,
         why="144 modes hold 2.6 half waves between seats: not quite the asymptotic law",
@@ -245,7 +246,7 @@ CASES = (
         quantity="order in 1/N of the seat force's mean square difference, jumps included, 144 to 288 modes, 350 km/h",
         source="a truncated jump in the mean square",
         reference=0.5,
-        why="what is smooth falls faster: the order is above 1/2 before it gets there",
+        why="the smooth part falls faster: the order approaches 1/2 from above",
         compute=lambda: _orders()[1],
         quick=False,
     ),

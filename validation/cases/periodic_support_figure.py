@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib as mpl
@@ -31,7 +32,7 @@ def draw(path: Path) -> None:
         left.plot(ours.x[near], 1e-3 * ours.force[near], color=colour, linewidth=0.9, label=f"{modes} modes in 36 m")
     left.set(xlabel="load ahead of the seat [m]", ylabel="seat force [kN]", xlim=(-2.2, 2.2))
     left.set_title("70 kN at 350 km/h on springs every 0.65 m", loc="left", fontsize=10)
-    measures = (
+    measures: tuple[tuple[str, str, str, Callable[[int], float]], ...] = (
         ("deflection under the load", "#009E73", "o", lambda n: deflection_error(350, 36.0, n)[0]),
         (
             "seat force, load 62 mm or more from a seat",

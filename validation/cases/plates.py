@@ -5,7 +5,7 @@ rigid plate on a Winkler bed, omega^2 = k / (rho h), in closed form. Plain plate
 
 Tolerances of meshes: a plane wave of wave number q at an angle theta to square elements of side h runs
 (1 + nu)/48 sin^2(2 theta) (q h)^2 too slow in this element (from the Fourier symbol of its stencil; along the mesh it
-is right to h^4), so a mode with q^4 = rho h omega^2 / D is allowed (1 + nu)/48 (q h)^2, h the longer side.
+is exact to h^4), so a mode with q^4 = rho h omega^2 / D is allowed (1 + nu)/48 (q h)^2, h the longer side.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def _allowed(name: str, ny: int) -> Reals:
 
 
 def _allowed_on_bed(name: str, ny: int) -> Reals:
-    """The same on the bed, whose share of omega^2 has no error.
+    """Allowed error on the bed, whose share of omega^2 has no error.
 
     Of the rigid motions the tilts bend a little by their rotary inertia, which takes (h/B)^2/2 off their frequency.
     """
@@ -120,8 +120,8 @@ CASES = (
             compute=lambda nx=nx, ny=ny: _free(nx, ny)[3:],
         )
         for nx, ny, rtol, why in (
-            (9, 2, 0.015, "two elements across, where mode 6 has a half wave in 1.9 m; h^2 from there"),
-            (18, 4, 0.015 / 3.0, "h^2: a quarter of 9 x 2, or a third where that is not yet in its range"),
+            (9, 2, 0.015, "two elements across, where mode 6 has a half wave in 1.9 m; h^2 for finer meshes"),
+            (18, 4, 0.015 / 3.0, "h^2: a quarter of 9 x 2, or a third where that mesh is not yet in the range of h^2"),
             (36, 8, 0.015 / 12.0, "h^2: a quarter of 18 x 4"),
         )
     ),
@@ -176,7 +176,7 @@ CASES = (
             name=f"slab-bed-{name}",
             kind="verification",
             quantity=f"nine lowest frequencies of the {name} slab on its bed, 18 x 4 elements [Hz]",
-            source=f"{RITZ}; CRTS II is left to its bounce: its lowest modes there are waves of 1.6 m",
+            source=f"{RITZ}; for CRTS II only the bounce: its lowest modes on the bed are waves of 1.6 m",
             reference=lambda name=name: _exact(name, bed=True),
             atol=_allowed_on_bed(name, 4),
             why="mesh as in free space, times (f_free/f)^2: the bed's share has no error; tilts: times (h/B)^2/2",

@@ -1,7 +1,7 @@
 """Rail window at rest: pinned modes, static deflection over discrete seats; convective terms in motion.
 
 References: frequency equation of the pinned Timoshenko beam (``closed_forms/timoshenko``); an
-independent calculation, made before this program, of CHN60 on rigid slabs with springs of 4e7 N/m every
+independent calculation, older than this program, of CHN60 on rigid slabs with springs of 4e7 N/m every
 0.63 m under 70 kN in a window of 36 m.
 """
 
@@ -47,7 +47,7 @@ def _lateral_beam() -> Beam:
 
 
 def _frequencies(plane: str, modes: int) -> Reals:
-    """Sorted frequencies of the window at rest [Hz]; torsion is left out of the lateral plane."""
+    """Sorted frequencies of the window at rest [Hz]; without torsion in the lateral plane."""
     M, _, K = getattr(_window(modes), plane)(0.0)
     omega2 = scipy.linalg.eigvalsh(K.toarray()[: 2 * modes, : 2 * modes], M.toarray()[: 2 * modes, : 2 * modes])
     return np.sqrt(omega2) / (2.0 * np.pi)
@@ -77,7 +77,7 @@ def _deflection(modes: int, over_seat: bool) -> float:
 
 
 def _convective_power() -> float:
-    """Power that the convective terms do not account for, over what they move; three random states."""
+    """Power not accounted for by the convective terms, relative to the power they transfer; three random states."""
     modes, V, worst = 60, 350.0 / 3.6, 0.0
     window = _window(modes)
     ends = np.cos(np.multiply.outer([0.0, LENGTH], window.wave_numbers))

@@ -1,12 +1,12 @@
 """Receptance of the discretely supported rail, 1-1500 Hz, and its pinned-pinned frequency, by the window and exactly.
 
-References: ``closed_forms/receptance`` (endless rail, transfer matrix of a span); frequency equation of the pinned
+References: ``closed_forms/receptance`` (infinite rail, transfer matrix of a span); frequency equation of the pinned
 Timoshenko beam of one span, whose first mode is the pinned-pinned wave: half a wave from seat to seat. Rail 60E1 (EN
 13674-1) with kappa = 0.4, G = 8.1e10 N/m^2, fastening ACE2021 (4e7 N/m, 5e4 N s/m) every 0.65 m on rigid ground.
 
-The window has ends that reflect, the reference has none: what returns has been damped by the seats, except near the
-pinned-pinned frequency, where the seats stand still. A loss factor of 0.01 of the rail (that of a rail in track without
-damping elements is 0.005 to 0.02) keeps the receptance there finite, and makes it a matter of tens of metres. The
+The window has ends that reflect, the reference has none: reflected waves are damped by the seats, except near the
+pinned-pinned frequency, where the seats do not move. A loss factor of 0.01 of the rail (that of a rail in track without
+damping elements is 0.005 to 0.02) keeps the receptance there finite, and limits the reflections to tens of metres. The
 engine's rails have no loss factor; here its elastic matrices are multiplied by 1 + 0.01 i.
 """
 
@@ -36,9 +36,9 @@ Complexes = NDArray[np.complex128]
 LOSS, PITCH = 0.01, 0.65
 FREQUENCIES = np.unique(np.concatenate([np.geomspace(1.0, 1500.0, 60), np.linspace(920.0, 960.0, 9)]))
 LONG_METRES = 72
-LONG = float(LONG_METRES)  # m: what returns from the ends near the pinned-pinned frequency is 0.3 % (36 m: 5 %)
+LONG = float(LONG_METRES)  # m: reflections from the ends near the pinned-pinned frequency are 0.3 % (36 m: 5 %)
 BANDS = ((1.0, 500.0), (500.0, 900.0), (900.0, 1000.0), (1000.0, 1500.0))
-SOURCE = "endless Timoshenko rail on discrete springs, transfer matrix of a span"
+SOURCE = "infinite Timoshenko rail on discrete springs, transfer matrix of a span"
 PINNED = {0.60: 1067.9, 0.63: 988.1, 0.65: 939.7}
 PLACES = {"seat": 0.0, "midspan": PITCH / 2.0}  # from the load to the next seat [m]
 
@@ -57,15 +57,15 @@ def _seats() -> Seats:
 
 @cache
 def _pinned_pinned(pitch: float) -> float:
-    """The window's wave with nodes on the seats [Hz]: 20 spans on stiff springs, the mode that strains them least.
+    """Frequency of the window's mode with nodes on the seats [Hz]: of 20 spans on stiff springs.
 
     Seats at multiples of the pitch; without damping. Among the modes of the supported window, the one with the nodes on
-    the seats has no part in the springs' energy.
+    the seats strains the springs least.
     """
     spans, modes = 20, 120
     window = RailWindow(_rail(), spans * pitch, modes)
     M, _, K = (matrix.toarray() for matrix in window.vertical(0.0))
-    seats = window.shape(pitch * np.arange(1, spans))
+    seats = window.shape(pitch * np.arange(1.0, spans))
     springs = np.zeros_like(K)
     springs[:modes, :modes] = _seats().stiffness * seats.T @ seats
     with threadpool_limits(1):
@@ -89,7 +89,7 @@ def _exact(where: str, loss: float = LOSS) -> Complexes:
 def _window(where: str, length: float, modes: int, loss: float = LOSS, local: bool = False) -> tuple[Complexes, Reals]:
     """Receptance at the window's middle, by the seats' forces R: two DOFs a mode, coupled by the seats only.
 
-    A mode left out stiffens every point that carries a force. With delta for its static compliance, the receptance
+    An omitted mode stiffens every point that carries a force. With delta for its static compliance, the receptance
     lacks delta (1 + sum R_n^2) to first order, where a load over seat n counts as 1 - R_n there.
 
     Args:
@@ -136,9 +136,9 @@ def _parts(values: Complexes) -> Reals:
 
 
 def _allowed(where: str) -> Reals:
-    """Compliance of the modes left out at all points that carry force, a quarter more [nm/N], shape (2 n,).
+    """1.25 times the compliance of the omitted modes at all points that carry a force [nm/N], shape (2 n,).
 
-    The quarter: across half a pitch the waves left out still pass delta / (k_N d / 2), an eighth, either way.
+    The factor: across half a pitch the omitted waves still transmit delta / (k_N d / 2), an eighth, in both directions.
     """
     missing = RailWindow(_rail(), LONG, 8 * LONG_METRES).missing_compliance[0]
     return 1.25e9 * missing * np.tile(_window(where, LONG, 8 * LONG_METRES)[1], 2)
@@ -150,7 +150,7 @@ def _bands(length: float, modes: int, local: bool) -> list[float]:
 
 
 def _order(where: str) -> float:
-    """Order in 1/N below 900 Hz, from 16 to 32 modes a metre."""
+    """Order in 1/N below 900 Hz, from 16 to 32 modes per metre."""
     errors = [_error(where, 36.0, modes, LOSS, False, (1.0, 900.0)) for modes in (576, 1152)]
     return float(np.log2(errors[0] / errors[1]))
 
@@ -160,7 +160,7 @@ CASES = (
         name="pinned-pinned",
         kind="validation",
         quantity="pinned-pinned frequency of 60E1 on seats every 0.60, 0.63, 0.65 m [Hz]",
-        source="printed in issue 3; kappa = 0.4, G = 8.1e10 N/m^2",
+        source="project specification; kappa = 0.4, G = 8.1e10 N/m^2",
         reference=tuple(PINNED.values()),
         atol=0.055,
         why="printed digits, and those of the mass: 60.21 kg/m against rho A = 60.2095 (0.005 Hz)",
@@ -169,7 +169,7 @@ CASES = (
     Case(
         name="pinned-pinned-exact",
         kind="verification",
-        quantity="the same [Hz]",
+        quantity="the same frequencies [Hz]",
         source="frequency equation of the pinned Timoshenko beam of one span",
         reference=lambda: [float(pinned_frequencies(_beam(), d, 1)[0, 0]) / (2.0 * np.pi) for d in PINNED],
         rtol=1e-6,
@@ -180,11 +180,11 @@ CASES = (
         Case(
             name=f"receptance-{where}",
             kind="verification",
-            quantity=f"real and imaginary part {words}, 1-1500 Hz [nm/N], 8 modes a metre in 72 m",
+            quantity=f"real and imaginary part {words}, 1-1500 Hz [nm/N], 8 modes per metre in 72 m",
             source=SOURCE,
             reference=lambda where=where: _parts(_exact(where)),
             atol=_allowed(where),
-            why="compliance of the modes left out, at the load and at the seats",
+            why="compliance of the omitted modes, at the load and at the seats",
             compute=lambda where=where: _parts(_window(where, LONG, 8 * LONG_METRES)[0]),
         )
         for where, words in (("seat", "over a seat"), ("midspan", "at mid-span"))
@@ -194,11 +194,11 @@ CASES = (
             name=f"receptance-{where}-{name}",
             kind="verification",
             quantity=f"largest relative difference {words}, {band[0]:.0f}-{band[1]:.0f} Hz [%]"
-            f" ({name}: 16 modes a metre in 72 m, compliance of the modes left out added)",
+            f" ({name}: 16 modes per metre in 72 m, compliance of the omitted modes added)",
             source=SOURCE,
             reference=0.5,
             rule="at most",
-            why="of the modes left out only (f / 8000 Hz)^2 of their compliance is missing now; ends return 0.3 %",
+            why="of the omitted modes' compliance only (f / 8000 Hz)^2 is still missing; the ends reflect 0.3 %",
             compute=lambda where=where, loss=loss, band=band: _error(where, LONG, 16 * LONG_METRES, loss, True, band),
             quick=name == "local",
         )
@@ -209,10 +209,10 @@ CASES = (
         name="receptance-order",
         kind="convergence",
         quantity="order in 1/N of the largest relative difference below 900 Hz, over a seat and at mid-span, 36 m",
-        source="the compliance of the modes left out falls as 1/N",
+        source="the compliance of the omitted modes falls as 1/N",
         reference=(1.0, 1.0),
         atol=0.1,
-        why="576 modes resolve the 0.325 m from load to seat with 10 half waves",
+        why="576 modes resolve the distance of 0.325 m from load to seat with 10 half waves",
         compute=lambda: [_order(where) for where in PLACES],
     ),
     *(
@@ -221,7 +221,8 @@ CASES = (
             kind="information",
             quantity=(
                 f"largest relative difference [%], {modes} modes in {length} m"
-                f"{', compliance of the rest added' if local else ''}: to 500, 900, 1000, 1500 Hz, seat; mid-span"
+                f"{', compliance of the omitted modes added' if local else ''}: to 500, 900, 1000, 1500 Hz, seat;"
+                f" mid-span"
             ),
             source=SOURCE,
             reference=(0.0,) * 8,

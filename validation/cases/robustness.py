@@ -1,6 +1,6 @@
-"""Settings and tracks that must not break the engine; same bits; times in closed form.
+"""Unusual settings and tracks; reproducible bits; durations in closed form.
 
-References: bounds, counts and closed forms as given row by row.
+References: bounds, counts and closed forms, stated with each case.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def _slow(kmh: float) -> float:
 
 
 def _travelled(scenario: str) -> float:
-    """Share of the way that a run has done."""
+    """Share of the distance that a run has covered."""
     found = simulate(scenario)
     way = load_scenario(scenario).train.distance
     step = found.position[1] - found.position[0]
@@ -41,7 +41,7 @@ def _braking_time() -> float:
 
 
 def _braking_time_exact() -> float:
-    """Kinetic energy from 350 to 330 km/h over 600 m by a cubic with level ends, from half the window on: int dx/V."""
+    """Time from 350 to 330 km/h in 600 m, kinetic energy a cubic with level ends, from half the window: int dx/V."""
     scenario = load_scenario("braking")
     fast, slow = (speed / 3.6 for speed in (350.0, 330.0))
 
@@ -50,7 +50,7 @@ def _braking_time_exact() -> float:
         return float((fast**2 + (slow**2 - fast**2) * done**2 * (3.0 - 2.0 * done)) ** -0.5)
 
     start = scenario.window_length / 2.0
-    return float(quad(slowness, start, 600.0)[0] + start / slow)  # beyond the last row the speed is held
+    return float(quad(slowness, start, 600.0)[0] + start / slow)  # beyond the last row the speed is constant
 
 
 def _hash(threads: int) -> str:
@@ -68,7 +68,7 @@ def _hash(threads: int) -> str:
 
 
 def _different_bits() -> int:
-    """Second run, then one and two threads: how many of the two comparisons differ."""
+    """Number of differing comparisons of two: a second run; one against two threads."""
     first = _hash(1)
     return sum(first != other for other in (_hash(1), _hash(2)))
 
@@ -78,7 +78,7 @@ CASES = (
         name="stable-144-modes",
         kind="verification",
         quantity="growth of a disturbance over 5000 steps, 144 modes in 36 m, dt = 2e-4 s",
-        source="a track only loses energy",
+        source="the track can only lose energy",
         reference=TOLERATED_GROWTH,
         rule="at most",
         why="beating of undamped pinned-pinned vibration; a newton grows to ten at most",
@@ -91,7 +91,7 @@ CASES = (
         source="60 modes, the same track",
         reference=lambda: 1e-3 * simulate("paper", "train.distance=100.0", "numerics.time_step=2e-4").vertical.std(),
         rtol=0.05,
-        why="60 modes are known to be 3 % of the peak from converged",
+        why="60 modes are within 3 % of the peak from converged forces",
         compute=lambda: (
             1e-3
             * simulate(
@@ -104,10 +104,10 @@ CASES = (
             name=f"slow-{kmh:g}",
             kind="verification",
             quantity=f"largest dynamic part of a vertical wheel force over its mean at {kmh:g} km/h, 30 m",
-            source="dynamic forces vanish with the speed; a step that fails oscillates by the whole load",
+            source="dynamic forces vanish with the speed; an unstable step oscillates by the whole load",
             reference=0.1,
             rule="at most",
-            why="a bound: twist of the track loads wheels quasi-statically",
+            why="a bound: twist of the track changes the loads quasi-statically",
             compute=lambda kmh=kmh: _slow(kmh),
             quick=kmh > 10.0,
         )
@@ -117,8 +117,8 @@ CASES = (
         Case(
             name=f"run-{name}",
             kind="verification",
-            quantity=f"ways done by the scenario {name}: {words}",
-            source="the run ends where it should",
+            quantity=f"share of the distance covered by the scenario {name}: {words}",
+            source="the run must reach its end",
             reference=1.0,
             why="a count",
             compute=lambda name=name: _travelled(name),
@@ -155,7 +155,7 @@ CASES = (
     Case(
         name="same-bits",
         kind="verification",
-        quantity="runs that differ in any bit: a second one, one with two threads",
+        quantity="runs that differ in any bit: a second run, a run with two threads",
         source="nothing in a run depends on the order of its threads",
         reference=0,
         why="a count",

@@ -1,9 +1,9 @@
-"""The engine's semi-discrete equations as one first-order system, for general-purpose ODE solvers.
+"""The engine's semi-discrete equations with sines as one first-order system, for general-purpose ODE solvers.
 
-Written with matrices, apart from the step and its kernels: linear parts from the host's M, C, K; fastenings as springs
-and dampers between a rail's shape at the moving seat and a slab's shape; only the wheel-rail contact and the nonlinear
-suspension elements are evaluated by the engine's kernels. y = (u, du/dt), u = (rails, slabs, vehicle), where a rail's
-coordinates are w, theta_y, v, theta_z, theta_x, N modes each.
+Written with matrices, independently of the step and its kernels: linear parts from the host's M, C, K; fastenings as
+springs and dampers between a rail's shape at the moving seat and a slab's shape; only the wheel-rail contact and the
+nonlinear suspension elements are evaluated by the engine's kernels. y = (u, du/dt), u = (rails, slabs, vehicle), where
+a rail's coordinates are w, theta_y, v, theta_z, theta_x, N modes each.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tiengine.engine.sine_state import SineState
 from tiengine.irregularity.irregularity import Irregularity
 from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
-from tiengine.model.model import Model
+from tiengine.model.sine_model import SineModel
 
 NUDGE = np.concatenate([np.full(5, 1e-9), np.full(5, 1e-7), np.full(18, 1e-9)])
 """Steps for the contact's derivatives: wheelset u and du/dt, then w, v, theta_x, slopes, rates of either rail."""
@@ -26,11 +26,11 @@ NUDGE = np.concatenate([np.full(5, 1e-9), np.full(5, 1e-7), np.full(18, 1e-9)])
 class SemiDiscrete:
     """M u'' + C u' + K u + fastenings(t, u, u') = gravity + suspension + contact(t, u, u'); one train, constant V."""
 
-    def __init__(self, model: Model, track: Irregularity, V: float, slabs: range) -> None:
+    def __init__(self, model: SineModel, track: Irregularity, V: float, slabs: range) -> None:
         """Assemble.
 
         Args:
-            model: Gives the matrices.
+            model: Source of the matrices.
             track: Irregularity.
             V: Speed [m/s].
             slabs: All slabs that the window touches, from its beginning to its end.
@@ -97,7 +97,7 @@ class SemiDiscrete:
         return out
 
     def fastenings(self, t: float) -> tuple[NDArray[np.float64], ...]:
-        """As matrices: elongations E u, their rates E u' + F u; with k and c by row."""
+        """Fastenings as matrices: elongations E u, their rates E u' + F u; with k and c by row."""
         here, phi, rate = self.shapes(t)
         E = -self.on_slab[here]
         F, n = np.zeros_like(E), self.modes
@@ -182,7 +182,7 @@ class SemiDiscrete:
         return np.einsum("kwm->wmk", (force[:28] - force[28:]) / (2.0 * NUDGE)[:, None, None])
 
     def _inputs(self) -> list[NDArray[np.float64]]:
-        """What a wheelset's contact feels, as linear in u and in v; shape (2, 28, n) a wheelset."""
+        """Inputs of a wheelset's contact as linear functions of u and v, shape (2, 28, n) per wheelset."""
         out = []
         for w in range(len(self.dof)):
             rows = np.zeros((2, 28, self.n))

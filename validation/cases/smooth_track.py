@@ -1,4 +1,4 @@
-"""The paper's train on a smooth track at 350 km/h: what remains is the passing of seats and slabs.
+"""The paper's train on a smooth track at 350 km/h: only the passing of seats and slabs excites it.
 
 References: the train's weight; Newton's third law; symmetry. Statistics are over ten slabs (56.7 m,
 2916 steps of 2e-4 s) after 50 m.
@@ -13,8 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.kernels import layout as at
 from tiengine.parameters.arrays import Reals
 from tiengine.vehicle.train import static_wheel_loads
@@ -56,18 +55,18 @@ def _ripple() -> Reals:
 def _supported() -> tuple[float, float]:
     """Mean of all fastening forces, and of all wheel forces on the rails, over two slabs [N]."""
     model = paper_model(dt=DT)
-    state = SineState.at_rest(model)
+    state = state_at_rest(model)
     equilibrium(model, state, 0.0, V)
     count = 2 * STEPS // SLABS
     chunk = Chunk.empty(model.ingredients, 2 * count, 2 * count, 1)
-    stepper = SineStepper(model, state, chunk)
-    X = V * DT * np.arange(1, 2 * count + 1)
+    stepper = make_stepper(model, state, chunk)
+    X = V * DT * np.arange(1.0, 2 * count + 1)
     stepper.load(X, np.full(2 * count, V), np.zeros(2 * count), np.zeros_like(chunk.irregularity))
     seats = []
     with threadpool_limits(1):
         for i in range(2 * count):
             stepper.step(i, i)
-            seats.append(state.seat_force[0, :, 0].sum())
+            seats.append(state.seat_forces[0, :, 0].sum())
     wheels = chunk.wheel[0, count:, ..., at.VERTICAL_FORCE].sum(axis=(1, 2))
     return float(np.mean(seats[count:])), float(wheels.mean())
 
@@ -80,7 +79,7 @@ CASES = (
         source="static wheel load",
         reference=_static,
         rtol=2e-3,
-        why=("creep forces of the canted contacts shift load between wheels; seats are passed as time goes on"),
+        why="creep forces of the inclined contacts and the passing of seats shift load between wheels",
         compute=lambda: _last(_run().vertical).mean(axis=0).ravel(),
     ),
     Case(
@@ -90,17 +89,17 @@ CASES = (
         source="weight of the train",
         reference=lambda: _static().sum(),
         rtol=1e-4,
-        why="the car's slow bounce after the start at one phase of the seats",
+        why="slow bounce of the car after the start at one phase of the seats",
         compute=lambda: _last(_run().vertical).sum(axis=(1, 2)).mean(),
     ),
     Case(
         name="smooth-passing",
         kind="verification",
         quantity=("share of the ripple's variance at multiples of the slab-passing frequency (seats: every ninth)"),
-        source="a periodic track forces a periodic answer",
+        source="a periodic track causes a periodic response",
         reference=0.99,
         rule="at least",
-        why="1 % is left to what remains of the start",
+        why="1 % for the remainder of the start's transient",
         compute=_passing_share,
     ),
     Case(
@@ -109,7 +108,7 @@ CASES = (
         quantity="vertical ripple, standard deviation and peak [N]",
         source="-",
         reference=(np.nan, np.nan),
-        why="grows with the modes: 60 in 36 m carry a tenth of the seats' contrast",
+        why="grows with the number of modes: 60 in 36 m carry a tenth of the seats' contrast",
         compute=_ripple,
     ),
     Case(
@@ -132,7 +131,7 @@ CASES = (
         source="mean of all wheel forces: inertia of the rails has no mean",
         reference=lambda: _supported()[1],
         rtol=1e-3,
-        why="exp(-8 m / 0.8 m) is held by the window's ends; two slabs are not exactly periodic yet",
+        why="the window's ends carry exp(-8 m / 0.8 m); two slabs are not exactly periodic yet",
         compute=lambda: _supported()[0],
     ),
 )

@@ -1,8 +1,7 @@
 """Wheel forces on rough track: growth with speed and with the class of the track.
 
-References: order of the classes by their densities; A_v of the German spectra (a linear system's standard deviation
-goes with the root of it). One realisation for all, so that runs differ by what is compared; standard deviations leave
-out the first 50 m.
+References: order of the classes by their densities; A_v of the German spectra (the standard deviation of a linear
+system is proportional to its root). All runs have the same realisation; standard deviations leave out the first 50 m.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ def _growth(force: str, speeds: tuple[int, ...], quick: bool) -> Case:
         source=f"at {', '.join(map(str, speeds[:-1]))} km/h on the same track",
         reference=lambda: [_deviation(kmh, "german_low", force) for kmh in speeds[:-1]],
         rule="at least",
-        why="a bound: the same waves come faster, S_F over frequency rises with V up to P2",
+        why="a bound: the same waves are passed faster, S_F over frequency rises with V up to P2",
         compute=lambda: [_deviation(kmh, "german_low", force) for kmh in speeds[1:]],
         quick=quick,
     )
@@ -65,10 +64,13 @@ CASES = (
         name="statistics-German-ratio",
         kind="verification",
         quantity="standard deviation of the vertical wheel forces at 200 km/h, German high over German low",
-        source="root of the ratio of A_v, 1.08e-6 over 4.032e-7, which is that of the cross level too",
+        source="root of the ratio of A_v, 1.08e-6 over 4.032e-7, also that of the cross level",
         reference=float(np.sqrt(1.08e-6 / 4.032e-7)),
         rtol=0.03,
-        why="linear but for the Hertz spring (8 % of the compliance, a third power of the load) and the lateral motion",
+        why=(
+            "linear except for the Hertz spring (8 % of the compliance, a third power of the load) and the lateral"
+            " motion"
+        ),
         compute=lambda: _deviation(200.0, "german_high") / _deviation(200.0, "german_low"),
         quick=False,
     ),

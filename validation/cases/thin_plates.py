@@ -1,9 +1,9 @@
-"""Thin plates of plain shape: free ones, the same on a bed, a large one under a point load.
+"""Thin rectangular plates: free, on a bed, and a large one under a point load.
 
 References: Ritz's method with Legendre polynomials (``closed_forms/plate_ritz``), converged to 1e-6; A. W. Leissa, The
 free vibration of rectangular plates, J. Sound Vib. 31 (1973) 257-293, table C16 (all edges free, nu = 0.3), whose
-digits come out of his own 36 beam functions (``closed_forms/plate_beam_functions``) and lie up to 1 % above the exact
-ones; omega^2 = omega_free^2 + k / (rho h) on a Winkler bed; the point load on an endless plate on such a bed
+digits follow from his own 36 beam functions (``closed_forms/plate_beam_functions``) and lie up to 1 % above the exact
+ones; omega^2 = omega_free^2 + k / (rho h) on a Winkler bed; the point load on an infinite plate on such a bed
 (``closed_forms/plate_winkler``). x along the side a, w down; parameters are omega a^2 sqrt(rho h/D).
 
 Tolerances of meshes: see ``plates``.
@@ -39,12 +39,12 @@ PRINTED = {
 }
 """omega a^2 sqrt(rho h / D)."""
 DIGIT = {1.0: np.full(6, 1e-3), 1.5: np.full(6, 1e-3), 2.5: np.repeat([1e-3, 1e-2], [4, 2])}
-"""One unit of the last printed digit: 35.02347 stands there as 35.024."""
-THIN = 1e-3  # h/b of thin plates: rotary inertia takes (q h)^2 / 24 < 1e-5 off their frequencies
+"""One unit of the last printed digit: 35.02347 is printed as 35.024."""
+THIN = 1e-3  # h/b of thin plates: rotary inertia lowers their frequencies by (q h)^2 / 24 < 1e-5
 BED = 50.0  # k b^4/D of thin plates on a bed
 QUARTER = 6.0  # l: from the point load to the edges of the plate on its bed
 PLACES = np.array([0.0, 1.0, 2.0, 3.0, np.sqrt(2.0), np.sqrt(8.0)])
-"""r/l: under the load, three places along the mesh, two along its diagonal."""
+"""Places r/l: under the load, three along the mesh, two along its diagonal."""
 _EXCESS = {per_radius: mesh_excess((1.0 + NU) / 48.0, 1.0 / per_radius) for per_radius in (2, 4)}
 
 
@@ -54,7 +54,7 @@ def _bed(stiffness: float) -> Mortar:
 
 
 def _plate(length: float, width: float, nx: int, ny: int, thickness: float) -> Slab:
-    """A plate without fastenings to speak of."""
+    """A plate with negligible fastenings."""
     return Slab(
         length=length, width=width, thickness=thickness, gap=0.0, fastening_pitch=length / 2.0, fastenings=2, E=3e10,
         nu=NU, rho=2500.0, seat_half_spacing=0.3 * width, elements_x=nx, elements_y=ny,
@@ -94,15 +94,15 @@ def _thin_bed_allowed(aspect: float) -> Reals:
 
 
 def _leissa_excess(aspect: float) -> Reals:
-    """How far his 36 functions are above the exact values."""
+    """Excess of Leissa's 36 functions over the exact values."""
     return leissa_parameters(aspect, NU, 6) - _thin_exact(aspect)
 
 
 @cache
 def _field(per_radius: int) -> Reals:
-    """Point load: w over w(0) of the endless plate at :data:`PLACES`, elements of side l/per_radius.
+    """Point load: w over w(0) of the infinite plate at :data:`PLACES`, elements of side l/per_radius.
 
-    A quarter of a square plate on its bed is held by symmetry, with the load in its corner; l = 1 m.
+    A quarter of a square plate on its bed with symmetry conditions and the load in its corner; l = 1 m.
     """
     n = round(QUARTER * per_radius)
     slab = _plate(QUARTER, QUARTER, n, n, 0.01)
@@ -124,7 +124,7 @@ CASES = (
             name=f"plate-aspect-{aspect:g}",
             kind="verification",
             quantity=f"free thin plate, a/b = {aspect:g}, omega a^2 sqrt(rho h/D), {nx} x {ny} elements, six modes",
-            source="Ritz's method, Legendre polynomials to degree 14, rotary inertia left out",
+            source="Ritz's method, Legendre polynomials to degree 14, without rotary inertia",
             reference=lambda aspect=aspect: _thin_exact(aspect),
             atol=_thin_allowed(aspect),
             why=f"{WAVE}; rotary inertia of h = b/1000",
@@ -140,7 +140,7 @@ CASES = (
             source=LEISSA,
             reference=PRINTED[aspect],
             atol=_thin_allowed(aspect) + _leissa_excess(aspect) + DIGIT[aspect],
-            why="his 36 functions lie above the exact values by 0.1 to 1.1 %; the mesh; printed digits",
+            why="his 36 functions are above the exact values by 0.1 to 1.1 %; the mesh; printed digits",
             compute=lambda aspect=aspect: _thin(aspect),
         )
         for aspect in ASPECTS
@@ -176,7 +176,7 @@ CASES = (
             source="-4/pi kei(r/l): P/(8 sqrt(k D)) under the load (Hertz 1884, Westergaard 1926)",
             reference=point_load_deflection(8.0, 1.0, 1.0, PLACES),
             atol=_EXCESS[per_radius],
-            why="what a mesh of this dispersion adds under the load, to first order",
+            why="effect of the mesh's dispersion under the load, to first order",
             compute=lambda per_radius=per_radius: _field(per_radius),
         )
         for per_radius in (2, 4)

@@ -1,7 +1,7 @@
-"""Time integration on the paper's case, first second: order, error, mortar in either half.
+"""Time integration on the paper's case, first second: order, error, mortar explicit or implicit.
 
-References: the same run with a step of 2.5e-5 s. Errors are the largest over all wheels and times as a
-part of the largest force; orders come from the root mean square differences of successive
+References: the same run with a step of 2.5e-5 s. Errors are the largest over all wheels and times relative to
+the largest force; orders come from the root mean square differences of successive
 halvings; those of the largest differences are listed for information.
 """
 
@@ -17,7 +17,7 @@ from validation.frame.runs import Forces, simulate
 
 FINEST, SAMPLE = 2.5e-5, 2e-4
 STEPS = (2e-4, 1e-4, 5e-5)
-LARGEST, COMMON = 2.5e-4, 1e-3  # longest step that keeps the bound, which the speed suite takes; samples of both runs
+LARGEST, COMMON = 2.5e-4, 1e-3  # longest step within the bound, used by the speed suite; samples of both runs
 
 
 def _run(dt: float, mortar: str = "implicit", sample: float = SAMPLE) -> Forces:
@@ -32,7 +32,7 @@ def _run(dt: float, mortar: str = "implicit", sample: float = SAMPLE) -> Forces:
 
 
 def _difference(first: Forces, second: Forces, direction: str) -> Reals:
-    """First less second at common samples [N], shape (n, wheelsets, 2)."""
+    """First run minus second at common samples [N], shape (n, wheelsets, 2)."""
     a, b = (getattr(run, direction) for run in (first, second))
     n = min(len(a), len(b))
     if not np.allclose(first.time[:n], second.time[:n], rtol=0.0, atol=1e-9):
@@ -54,7 +54,7 @@ def _order(direction: str) -> float:
 
 
 def _orders_of_largest() -> list[float]:
-    """The same from the largest differences, vertical and lateral."""
+    """Order from the largest differences, vertical and lateral."""
     runs, orders = [_run(dt) for dt in STEPS], []
     for direction in ("vertical", "lateral"):
         sizes = [np.abs(_difference(a, b, direction)).max() for a, b in pairwise(runs)]
@@ -82,7 +82,7 @@ CASES = (
         quantity="order from the largest differences instead: vertical, lateral",
         source="-",
         reference=(2.0, 2.0),
-        why="one instant at a kink (lift-off, arc joint of the flange root) decides",
+        why="determined by one instant at a kink (lift-off, arc joint of the flange root)",
         compute=_orders_of_largest,
     ),
     *(
@@ -100,20 +100,20 @@ CASES = (
         )
         for direction in ("vertical", "lateral")
         for dt, sample, why in (
-            (2e-4, SAMPLE, "a tenth of what the number of modes costs"),
-            (1e-4, SAMPLE, "a tenth of what the number of modes costs"),
-            (LARGEST, COMMON, "the bound that makes it the longest step of the speed suite"),
+            (2e-4, SAMPLE, "a tenth of the error of the number of modes"),
+            (1e-4, SAMPLE, "a tenth of the error of the number of modes"),
+            (LARGEST, COMMON, "this bound sets the longest step of the speed suite"),
         )
     ),
     *(
         Case(
             name=f"mortar-halves-{direction}",
             kind="convergence",
-            quantity=(f"{direction} force, bed explicit less bed implicit, over the peak [%], 1e-4 s"),
+            quantity=(f"{direction} force, bed explicit minus bed implicit, over the peak [%], 1e-4 s"),
             source="the same equations, split differently",
             reference=0.1,
             rule="at most",
-            why="the two passes leave an error of order dt^2 in what is explicit",
+            why="the two passes leave an error of order dt^2 in the explicit part",
             compute=lambda direction=direction: _error(_run(1e-4, "explicit"), _run(1e-4), direction),
         )
         for direction in ("vertical", "lateral")

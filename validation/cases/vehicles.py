@@ -1,7 +1,7 @@
 """Vehicles: frequencies with wheelsets held, rigid motions, energy, static loads.
 
-References: calculations made independently of this program from the same published data sheets, when
-these were collected (digits as printed there): CRH380A v2 and v6 after a public MATLAB code, Zhai's
+References: calculations from the same published data sheets, independent of this program and made when the sheets
+were collected (with their printed digits): CRH380A v2 and v6 after a public MATLAB code, Zhai's
 coach, CRH2 after Huo and Dai, Shock and Vibration 2019, 2015465.
 """
 
@@ -25,11 +25,11 @@ LOADS = {"CRH380A_v6": 65.0, "CRH380A_v2": 68.7, "Zhai_coach": 55.9, "CRH2": 61.
 
 
 def _train(name: str) -> TrainModel:
-    return assemble([load_vehicle(name)])
+    return assemble([load_vehicle(name)], series_springs=False)
 
 
 def _held(name: str) -> Reals:
-    """Frequencies [Hz] nearest to the printed ones, where pairs of the two frames are one number."""
+    """Frequencies [Hz] nearest to the printed ones, which give one number for pairs of the two frames."""
     train = _train(name)
     free = np.setdiff1d(np.arange(train.n), train.wheelset_dof)
     own = np.sqrt(eigh(train.K[np.ix_(free, free)], train.M[np.ix_(free, free)], eigvals_only=True)) / (2.0 * np.pi)
@@ -90,8 +90,7 @@ CASES = (
         kind="verification",
         quantity="zero frequencies of a free vehicle",
         source=(
-            "y, z, roll, yaw of the whole (pitch needs the longitudinal motion that is left out), spin of"
-            " four wheelsets"
+            "y, z, roll, yaw of the whole vehicle (pitch needs the omitted longitudinal motion), spin of four wheelsets"
         ),
         reference=8,
         why="a count",
@@ -111,7 +110,7 @@ CASES = (
         name="vehicle-loads",
         kind="validation",
         quantity=f"static wheel load of {', '.join(LOADS)} [kN]",
-        source="weights of the data sheets, by hand",
+        source="weights of the data sheets, calculated by hand",
         reference=tuple(LOADS.values()),
         atol=0.05,
         why="printed digits",

@@ -1,13 +1,13 @@
 """Spectra of the vertical wheel force at 350 km/h: passing frequencies of seats and slabs, and the P2 resonance.
 
-References: V/d for what is passed every d; ``closed_forms/two_mass`` for P2, and for |Q/z| about it.
+References: V/d for objects at the pitch d; ``closed_forms/two_mass`` for P2, and for |Q/z| about it.
 
 Q/z is the cross spectrum of force and irregularity under the same wheel over the spectrum of the latter, summed over
 the wheels, at a tenth of the German low-disturbance spectrum (no lift-off), whose waves of 0.5 m and longer reach
-194 Hz. All wheels run over the same track, so that a run of 350 m has n = 14 independent stretches of half a second
+194 Hz. All wheels run over the same track, so that a run of 350 m has n = 14 independent intervals of half a second
 (two channels, seven Hann windows), one of 1550 m 62. At the coherence of 0.93 about P2 |Q/z| then scatters by
 sqrt((1 - 0.93)/(2 n 0.93)) = 5 and 2.5 % (J. S. Bendat, A. G. Piersol, Random data (4th ed., 2010), ch. 9).
-The peak is broad, 1 - ((f - f_0)/12.5 Hz)^2: scatter moves it by 12.5 Hz times the root, 2.8 and 2.0 Hz.
+The peak is broad, 1 - ((f - f_0)/12.5 Hz)^2: scatter shifts it by 12.5 Hz times the root, 2.8 and 2.0 Hz.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ RUN_IN = 50.0  # m
 SHORT, LONG = 400.0, 1600.0  # m
 SEAT, SLAB, SLAB_WIDTH = 0.63, 5.67, 2.5  # m
 V, DT, SLABS, PERIOD = 350.0 / 3.6, 2e-4, 10, 2916  # PERIOD steps of DT at V are SLABS of 5.67 m
-BAND = (20.0, 120.0)  # Hz: where P2 is looked for; P1 is far above
+BAND = (20.0, 120.0)  # Hz: range of the search for P2; P1 is far above
 LINES = np.arange(60.0, 151.0, 10.0)  # Hz: above the resonance, below the seats' passing
 RESOLUTION = 2.0  # Hz
 ROUGH = ("irregularity.scale=0.1", "irregularity.wavelength_min=0.5", f"numerics.time_step={DT}")
@@ -123,7 +123,7 @@ def wheel_on_track() -> tuple[WheelOnTrack, WheelOnTrack]:
 def _expected(frequency: Reals) -> Reals:
     """|F/z| of bounce and roll in equal parts: vertical and cross level move the rails with equal power [N/m].
 
-    The bogie's other wheel runs over the same z a time d/V before or after: with a = z/F of one wheel and c the rail's
+    The bogie's other wheel passes the same z a time d/V before or after: with a = z/F of one wheel and c the rail's
     receptance at d, the mean of both is (a - c cos(omega d/V))/(a^2 - c^2).
     """
     bogie, total = float(-np.diff(load_scenario("default").parts.vehicles[0].axle_positions)[0]), np.zeros(1, complex)
@@ -141,7 +141,7 @@ def _largest(spectrum: Spectrum, low: float, high: float) -> float:
 
 
 def _contrast() -> Reals:
-    """Lines of slab and seat over what lies halfway to the next lines of the slab."""
+    """Lines of slab and seat over the density halfway to the neighbouring lines of the slab."""
     S, seats = smooth().density, round(SLAB / SEAT)
     half = SLABS // 2
     return np.array([S[i] / max(S[i - half], S[i + half]) for i in (SLABS, seats * SLABS)])
@@ -168,7 +168,7 @@ def _lines() -> Reals:
 
 
 def draw(path: Path) -> None:
-    """Spectra of the vertical wheel force on smooth and rough track, with the frequencies that should show.
+    """Spectra of the vertical wheel force on smooth and rough track, with the expected frequencies.
 
     Args:
         path: PNG to write.
@@ -230,7 +230,10 @@ CASES = (
         source="a periodic track forces lines only",
         reference=(100.0, 100.0),
         rule="at least",
-        why="20 dB are left to what remains of the start; Hann's window is far below at five bins",
+        why=(
+            "20 dB allow for the remainder of the start's transient; the side lobes of Hann's window at five bins are"
+            " far lower"
+        ),
         compute=_contrast,
     ),
     Case(
@@ -241,7 +244,8 @@ CASES = (
         reference=lambda: two_mass_frequencies(wheel_on_track()[0])[0],
         rtol=0.10,
         why=(
-            "crude, in frequency: damping 4 %, roll (6 % less mass) 3 %, shear of the rail 2 %, slab and bed 2 %, half"
+            "approximations, in frequency: damping 4 %, roll (6 % less mass) 3 %, shear of the rail 2 %, slab and bed"
+            " 2 %, half"
             " the resolution 2 %, wheel beyond in the bogie 2 %: 6 % in quadrature, as much again in its worst sum"
         ),
         compute=lambda: _p2()[0],

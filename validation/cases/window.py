@@ -1,8 +1,8 @@
-"""What only a moving window could do wrong: ripple, slabs that come and go, defects that pass through it.
+"""Errors peculiar to a moving window: ripple, slabs that enter and leave, defects that pass through it.
 
 References: the traditional full-length model, where no slab ever enters and no window has an end. The defects' track
-is smooth, so that nothing but the defects is felt; the void covers four whole plate elements, since the engine blurs
-the edges of others by its quadrature cells.
+is smooth, so that only the defects act; the void covers four whole plate elements, since the engine's
+quadrature cells blur the edges of others.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import Scenario, load_scenario
@@ -26,21 +25,21 @@ from validation.msm.simulate import FullLength, load
 from validation.msm.simulate import prepare as prepare_full
 from validation.paper.comparison import ALL_MODES, PER_METRE, difference
 
-STEP, FINE = 1e-4, 5e-5  # a wheel flies over the failed fastenings, and the blow wants a finer step
+STEP, FINE = 1e-4, 5e-5  # a wheel lifts off over the failed fastenings, and its impact needs a finer step
 PITCH, SEATS_PER_SLAB = 5.67, 9
 FAILED, NEIGHBOURS = (100, 102), (97, 98, 99, 103, 104, 105)  # seats of the left rail; chainage 63 to 65 m
-VOID_SLAB, VOID_SEATS = 12, (106, 109, 112, 115)  # chainage 68 to 73.7 m; two seats over the void, two beside it
+VOID_SLAB, VOID_SEATS = 12, (106, 109, 112, 115)  # chainage 68 to 73.7 m; two seats over the void, two next to it
 DEFECTS = (
     f'track.failed_fastenings=[{{rail="left", seats={list(FAILED)}, factor=0.0}}]',
     f"track.mortar_voids=[{{slab={VOID_SLAB}, x=[0.0, {4 * 5.6 / 9}], y=[-1.25, 1.25], factor=0.0}}]",
 )
 SMOOTH = 'irregularity.spectrum="none"'
-SOURCE = "traditional model, 2 modes a metre, slabs with all modes of the mesh"
+SOURCE = "traditional model, 2 modes per metre, slabs with all modes of the mesh"
 ENTRIES = (36.0, 44.0)
 EVENT = 10
-"""Steps after a slab's entry that are looked at: 1 ms, in which a wave runs 3 m along the rail."""
+"""Steps that are examined after a slab's entry: 1 ms, in which a wave runs 3 m along the rail."""
 CALM = 35.0
-"""Chainage behind which the start's own ringing is gone [m]."""
+"""Chainage from which the start's transient has decayed [m]."""
 
 
 def _settings(length: float, step: float, *overrides: str) -> tuple[str, ...]:
@@ -49,7 +48,7 @@ def _settings(length: float, step: float, *overrides: str) -> tuple[str, ...]:
 
 
 def _rail(step: float) -> FullLength:
-    """A rail of 200 m: from the ends of 100 m, waves of a wheel's blow come back with 0.15 % of the peak."""
+    """A rail of 200 m: from the ends of 100 m, waves of a wheel's impact return with 0.15 % of the peak."""
     return FullLength(200.0, PER_METRE, ALL_MODES, step)
 
 
@@ -77,7 +76,7 @@ def _at_entries(run: Forces, length: float) -> float:
     """Largest second difference of any wheel force within a millisecond of a slab's entry into a window [N]."""
     forces = np.concatenate([run.vertical, run.lateral], axis=2).reshape(len(run.time), -1)
     kink = np.abs(np.diff(forces, n=2, axis=0)).max(axis=1)
-    slab = np.floor((run.position - 0.5 * length) / PITCH)  # of the window's rear end: one leaves as one enters
+    slab = np.floor((run.position - 0.5 * length) / PITCH)  # at the window's rear end: one slab leaves as one enters
     entered = np.flatnonzero(np.diff(slab))
     entered = entered[run.position[entered] > CALM]
     return float(max(kink[k - 1 : k + EVENT].max() for k in entered))
@@ -93,10 +92,10 @@ def _seats_of_window() -> Reals:
     scenario = _scenario()
     V, chosen = scenario.train.speed.fastest, np.array([*NEIGHBOURS, *VOID_SEATS])
     model, _ = prepare_window(scenario)
-    state = SineState.at_rest(model)
+    state = state_at_rest(model)
     equilibrium(model, state, scenario.rear, V)
     steps = int(scenario.train.distance / (V * FINE))
-    stepper = SineStepper(model, state, Chunk.empty(model.ingredients, steps, 1, 1))
+    stepper = make_stepper(model, state, Chunk.empty(model.ingredients, steps, 1, 1))
     X = scenario.rear + V * FINE * np.arange(1.0, steps + 1)
     stepper.load(X, np.full(steps, V), np.zeros(steps), np.zeros_like(stepper.chunk.irregularity))
     forces = np.zeros((steps, len(chosen)))
@@ -104,14 +103,15 @@ def _seats_of_window() -> Reals:
         for i in range(steps):
             stepper.step(i)
             place = chosen - state.first_seat
-            inside = (place >= 0) & (place < state.seat_force.shape[3])
-            forces[i, inside] = state.seat_force[0, 0, 0, place[inside]]
+            now = state.seat_forces[0, 0, 0]
+            inside = (place >= 0) & (place < len(now))
+            forces[i, inside] = now[place[inside]]
     return forces
 
 
 @cache
 def _seats_of_full() -> Reals:
-    """The same in the full-length model."""
+    """Vertical force of the chosen seats in the full-length model."""
     scenario = _scenario()
     steps = len(_seats_of_window())
     stepper = prepare_full(scenario, _rail(FINE), steps, 1, 1)
@@ -133,7 +133,7 @@ CASES = (
         source=SOURCE,
         reference=lambda: [_ripple(_full())] * 2,
         rtol=0.05,
-        why="the issue's bound; the same modes a metre carry the same contrast of the seats",
+        why="required bound; with the same modes per metre both models carry the same contrast of the seats",
         compute=lambda: [_ripple(_window(length)) for length in (36.0, 60.0)],
     ),
     Case(
@@ -141,7 +141,7 @@ CASES = (
         kind="full length",
         quantity="kinks within 1 ms of a slab's entry (largest second difference of any wheel force at 1e-4 s) [N],"
         " smooth track, 36 and 44 m window",
-        source="the same instants of the traditional model, which no slab enters",
+        source="the same instants of the traditional model, in which no slab enters",
         reference=lambda: [_at_entries(_full(), length) for length in ENTRIES],
         atol=0.1,
         why="1.5e-6 of a wheel load",
@@ -156,7 +156,7 @@ CASES = (
             source=SOURCE,
             reference=0.2,
             rule="at most",
-            why="as on a sound track at equal modes a metre",
+            why="as on a sound track with equal modes per metre",
             compute=lambda direction=direction: _over_defects(direction),
         )
         for direction in ("vertical", "lateral")

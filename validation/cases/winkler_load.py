@@ -1,8 +1,8 @@
-"""A constant load on a continuous foundation, Euler and Timoshenko, damped and not: window against endless beam.
+"""A constant load on a continuous foundation, Euler and Timoshenko, damped and undamped: window against infinite beam.
 
 References: ``closed_forms/winkler`` (Kenney 1954; Fryba 1999, ch. 13) for the Euler beam, ``closed_forms/timoshenko``
 for the other. The rail is CHN60; for the Euler beam its shear modulus is 1e5 times and its density 1e-6 times the true
-one (the mass per length stays), which leaves shear and rotary inertia out. Foundation: the paper's fastenings, smeared.
+one (the mass per length stays), which removes shear and rotary inertia. Foundation: the paper's fastenings, smeared.
 Signs: down positive, places ahead of the load positive.
 """
 
@@ -55,7 +55,7 @@ def _window(euler: bool, V: float, c: float) -> Reals:
     """Deflection of the window around a steady load at its middle [mm]: d/dt = 0 in the moving frame."""
     window = RailWindow(_rail(euler), LENGTH, MODES)
     A = window.vertical(V)[2].toarray()
-    # Galerkin on k w - c V w', with int W_i W_j' by quadrature, apart from the engine's closed form
+    # Galerkin on k w - c V w', with int W_i W_j' by quadrature, independent of the engine's closed form
     A[:MODES, :MODES] += 0.5 * LENGTH * K * np.eye(MODES) - c * V * _flow()
     load = np.zeros(2 * MODES)
     load[:MODES] = LOAD * window.shape(np.array([LENGTH / 2.0]))[0]
@@ -65,7 +65,7 @@ def _window(euler: bool, V: float, c: float) -> Reals:
 
 
 def _exact(euler: bool, V: float, c: float) -> Reals:
-    """The endless beam [mm]."""
+    """Deflection of the infinite beam [mm]."""
     beam = _beam(euler)
     if not euler:
         return 1e3 * moving_load_deflection(beam, K, c, V, LOAD, PLACES)
@@ -75,9 +75,10 @@ def _exact(euler: bool, V: float, c: float) -> Reals:
 
 
 def _allowed(euler: bool, V: float) -> float:
-    """1.1 times what the modes left out would add under the load, softened by m V^2 [mm]; less beside it.
+    """1.1 times the deflection of the omitted modes under the load, with the softening by m V^2 [mm].
 
-    The slender beam keeps 1e-5 of the shear compliance of every wave.
+    It bounds the error everywhere, which is less away from the load. The Euler beam keeps 1e-5 of the shear compliance
+    of every wave.
     """
     beam = _beam(euler)
     moving = Beam(beam.EI - beam.rho_I * V**2, beam.kGA - beam.m * V**2, beam.m, beam.rho_I)
@@ -89,10 +90,10 @@ CASES = tuple(
         name=f"winkler-{'euler' if euler else 'timoshenko'}-{'damped' if c else 'undamped'}-{name}",
         kind="verification",
         quantity=f"deflection at nine places around 70 kN at {3.6 * V:.0f} km/h [mm], {MODES} modes in 36 m",
-        source="Kenney 1954; Fryba 1999, ch. 13" if euler else "endless Timoshenko beam, residues",
+        source="Kenney 1954; Fryba 1999, ch. 13" if euler else "infinite Timoshenko beam, residues",
         reference=lambda euler=euler, V=V, c=c: _exact(euler, V, c),
         atol=_allowed(euler, V),
-        why="1.1 times the compliance of the modes left out at this speed",
+        why="1.1 times the compliance of the omitted modes at this speed",
         compute=lambda euler=euler, V=V, c=c: _window(euler, V, c),
     )
     for euler in (True, False)

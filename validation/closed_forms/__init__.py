@@ -1,1 +1,1 @@
-"""Exact solutions, written apart from the engine; tests use them as well."""
+"""Exact solutions, independent of the engine; tests use them as well."""

@@ -1,7 +1,7 @@
-r"""A constant load that moves on an endless Timoshenko rail on discrete damped springs, by Floquet's transform.
+r"""A constant load that moves on an infinite Timoshenko rail on discrete damped springs, by Floquet's transform.
 
 The rail of ``closed_forms/timoshenko`` stands on seats at x = n d, each a spring k and a damper c on rigid ground,
-without mass. The load P is at x = V t. What the load does at one seat it does d / V later at the next,
+without mass. The load P is at x = V t. The history at one seat repeats at the next one d / V later,
 
     F_n(t) = R(t - n d / V)
 
@@ -12,18 +12,18 @@ excitation, Acustica 84 (1998) 280-288. With w^(x, omega) = int w exp(-i omega t
     H(kappa) = B / D,  B = EI kappa^2 + S - rho I omega^2,  D = (S kappa^2 - m omega^2) B - S^2 kappa^2
     g(x)     = -i sum_j B(kappa_j) / D'(kappa_j) exp(-i kappa_j |x|),   D(kappa_j) = 0, Im kappa_j < 0
 
-the load alone moves the free rail by (P / V) H(omega / V) exp(-i omega x / V), a point force by g. Therefore
+the load alone deflects the free rail by (P / V) H(omega / V) exp(-i omega x / V), a point force by g. Therefore
 
     R^ = Z (P / V) H(omega / V) / (1 + Z sum_n g(n d) exp(-i omega n d / V))
 
 and each of the four sums is geometric. H has poles on the real axis (waves of the free rail as slow as the load), which
-cancel in R^; all is evaluated at omega - i eta, where no pole is met and the waves that leave are those that decay, and
-R comes out of the inverse transform times exp(eta t). The deflection at x, when the load is there, is
+cancel in R^; everything is evaluated at omega - i eta, where there are no poles and outgoing waves decay, and
+R is the inverse transform times exp(eta t). The deflection at x, when the load is there, is
 
     w = 1 / (2 pi) int [ (P / V) H(omega / V) - R^ sum_n g(x - n d) exp(i omega (x - n d) / V) ] d omega .
 
-R is not smooth. A kink of the shear strain travels with the load; when it crosses a seat, the seat's damper feels a
-jump of the material rate, and R jumps down by
+R is not smooth. A kink of the shear strain travels with the load; when it crosses a seat, the material rate at the
+seat's damper jumps, and R jumps down by
 
     J = c V P / (S - m V^2) / (1 + c / (2 sqrt(S m)))
 
@@ -55,8 +55,8 @@ __all__ = ["Seats", "deflection_under_load", "free_rail", "jump", "load_transfer
 Complexes = NDArray[np.complex128]
 
 POINTS = 2**17  # of the inverse transform
-WAY = 80.0  # m: the load's way in the inverse transform; a seat far from the load feels nothing
-DECAY = 0.06  # 1/m: eta / V; less than the decay of R along the way
+DISTANCE = 80.0  # m: the load's distance in the inverse transform; a seat far from the load carries no force
+DECAY = 0.06  # 1/m: eta / V; less than the decay of R over distance
 
 
 @dataclass(frozen=True)
@@ -114,10 +114,10 @@ def free_rail(beam: Beam, seats: Seats, omega: Complexes, phase: Complexes, x: f
 
     Args:
         beam: The rail.
-        seats: Gives the pitch d.
+        seats: Source of the pitch d.
         omega: Frequencies [rad/s].
         phase: Lag from seat to seat [rad], omega d / V for a moving load.
-        x: Place from seat 0 [m].
+        x: Position from seat 0 [m].
     """
     turns, x = divmod(x, seats.pitch)
     kappa, amplitude = waves(beam, omega)
@@ -128,8 +128,9 @@ def free_rail(beam: Beam, seats: Seats, omega: Complexes, phase: Complexes, x: f
 
 
 def _frequencies(V: float) -> Complexes:
-    """The line on which the inverse transform runs [rad/s]."""
-    return 2.0 * np.pi * np.fft.fftfreq(POINTS, WAY / (V * POINTS)) - 1j * DECAY * V
+    """Frequencies of the inverse transform, on a line below the real axis [rad/s]."""
+    real = 2.0 * np.pi * np.fft.fftfreq(POINTS, DISTANCE / (V * POINTS))
+    return np.asarray(real - 1j * DECAY * V, dtype=np.complex128)
 
 
 def _seat_spectrum(beam: Beam, seats: Seats, V: float, P: float, omega: Complexes) -> Complexes:
@@ -145,7 +146,7 @@ def _seat_spectrum(beam: Beam, seats: Seats, V: float, P: float, omega: Complexe
 
 
 def seat_force(beam: Beam, seats: Seats, V: float, P: float, x: Reals) -> Reals:
-    """Force of a seat, by the load's place.
+    """Force of a seat over the position of the load.
 
     Args:
         beam: The rail.
@@ -159,13 +160,13 @@ def seat_force(beam: Beam, seats: Seats, V: float, P: float, x: Reals) -> Reals:
     """
     omega = _frequencies(V)
     spectrum = _seat_spectrum(beam, seats, V, P, omega) * (-1.0) ** np.arange(POINTS)  # t = 0 in the middle
-    way = (np.arange(POINTS) - POINTS // 2) * (WAY / POINTS)
-    history = (np.fft.ifft(spectrum) * (POINTS * V / WAY)).real * np.exp(DECAY * way)
+    way = (np.arange(POINTS) - POINTS // 2) * (DISTANCE / POINTS)
+    history = (np.fft.ifft(spectrum) * (POINTS * V / DISTANCE)).real * np.exp(DECAY * way)
     return np.interp(x, way, history)
 
 
 def deflection_under_load(beam: Beam, seats: Seats, V: float, P: float, x: Reals) -> Reals:
-    """Deflection of the rail where the load is.
+    """Deflection of the rail under the load.
 
     Args:
         beam: The rail.
@@ -180,19 +181,19 @@ def deflection_under_load(beam: Beam, seats: Seats, V: float, P: float, x: Reals
     omega = _frequencies(V)
     alone = P / V * load_transfer(beam, omega / V, omega)
     R, lag = _seat_spectrum(beam, seats, V, P, omega), omega * seats.pitch / V
-    # beyond the highest wave number of the sum only the kink of the shear strain is left
-    beyond = P / (np.pi * (beam.kGA - beam.m * V**2)) * WAY / (np.pi * POINTS)
+    # beyond the highest wave number of the sum only the kink of the shear strain remains
+    beyond = P / (np.pi * (beam.kGA - beam.m * V**2)) * DISTANCE / (np.pi * POINTS)
     found = []
     for place in np.mod(x, seats.pitch):
         points = zip(seats.offset, seats.share, strict=True)
         spread = sum(a * free_rail(beam, seats, omega, lag, place - x) for x, a in points)
         carried = R * spread * np.exp(1j * omega * place / V)
-        found.append(float(np.sum(alone - carried).real) * V / WAY + beyond)
+        found.append(float(np.sum(alone - carried).real) * V / DISTANCE + beyond)
     return np.array(found)
 
 
 def jump(beam: Beam, seats: Seats, V: float, P: float) -> float:
-    """J, by which a point seat's force falls as the load crosses the seat [N]."""
+    """Jump J by which the seat force falls when the load crosses the seat [N]."""
     strain = P / (beam.kGA - beam.m * V**2)
     own = 1.0 + seats.damping / (2.0 * np.sqrt(beam.kGA * beam.m))
     return float(seats.damping * V * strain / own)

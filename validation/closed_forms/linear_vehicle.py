@@ -3,8 +3,8 @@
 A wheelset keeps both wheels on the rails: z is zero and the roll follows the shift, phi = -kappa y. With Kalker's
 linear theory at the static load N (two wheels a wheelset), b the half distance of the contacts, prime = d/dt,
 
-  slip across        xi_y = (1 + r0 kappa) y'/V - psi,    spin  xi_s = psi'/V - (+-) gamma / r0,
-  slip along         xi_x = -(+-) (lambda y / r0 + b psi'/V),
+  lateral slip       xi_y = (1 + r0 kappa) y'/V - psi,    spin  xi_s = psi'/V - (+-) gamma / r0,
+  longitudinal slip  xi_x = -(+-) (lambda y / r0 + b psi'/V),
   work on y          -(1 + r0 kappa) [2 f22 xi_y + 2 f23 (psi'/V - Gamma y/r0)] - 2 N c y,
   moment about z     -2 f11 b (lambda y/r0 + b psi'/V) + 2 f23 xi_y - 2 f33 (psi'/V - Gamma y/r0)
                      + 2 N b tan(gamma_0) psi.
@@ -14,8 +14,9 @@ equivalent linearisation at one amplitude A of a harmonic shift: f(y) -> (2/A) <
 S. Stichel, Rail Vehicle Dynamics (2017), ch. 6 and 10; A. H. Wickens, Fundamentals of Rail Vehicle Dynamics (2003),
 ch. 2.
 
-How it differs from the engine: rigid rails, no seats; linear profiles, suspension (dampers at their initial slope) and
-creep (no saturation, coefficients of the centred wheelset); so no limit cycle and no influence of the kick.
+Differences from the engine: rigid rails, no seats; linear profiles, suspension (dampers at their initial slope) and
+creep (no saturation, coefficients of the centred wheelset); hence no limit cycle and no influence of the size of the
+disturbance.
 """
 
 from __future__ import annotations
@@ -44,13 +45,13 @@ class EquivalentContact:
         conicity: lambda = d(rolling radius)/dy.
         roll: kappa = -d(roll)/dy [1/m].
         angle: Gamma = d tan(gamma)/dy [1/m].
-        rise: c, curvature of the axle's way up over y [1/m].
-        slope: tan(gamma_0), centred.
+        rise: c, curvature of the axle's rise over y [1/m].
+        slope: tan(gamma_0) of the centred wheelset.
         half_base: b, half distance of the contacts [m].
-        f11: Kalker's coefficient along [N].
-        f22: Across [N].
-        f23: Spin to lateral force [N m].
-        f33: Spin to moment [N m^2].
+        f11: Kalker's longitudinal coefficient [N].
+        f22: Lateral coefficient [N].
+        f23: Coefficient from spin to lateral force [N m].
+        f33: Coefficient from spin to moment [N m^2].
     """
 
     conicity: float
@@ -70,7 +71,7 @@ def equivalent_contact(pair: WheelRailPair, table: ContactTable, load: float, am
 
     Args:
         pair: Wheel and rail.
-        table: Their contact table, of which the creep coefficients at the centre are taken.
+        table: Their contact table; its creep coefficients at the centre are used.
         load: Static wheel load N [N].
         amplitude: A [m].
     """
@@ -102,7 +103,7 @@ def fastest_growth(train: TrainModel, contact: EquivalentContact, load: float, V
     """Eigenvalue with the largest real part.
 
     Args:
-        train: Its M, C, C_speed, K; nonlinear elements at their initial slope.
+        train: Source of M, C, C_speed, K; nonlinear elements at their initial slope.
         contact: Contact of every wheelset.
         load: Static wheel load N [N].
         V: Speed [m/s].
@@ -122,7 +123,7 @@ def fastest_growth(train: TrainModel, contact: EquivalentContact, load: float, V
 def critical_speed(
     train: TrainModel, contact: EquivalentContact, load: float, top: float = 1000.0, step: float = 5.0
 ) -> float:
-    """Lowest speed [km/h], in steps, at which a motion grows; infinite if none does up to ``top``."""
+    """Lowest speed [km/h] of a grid at which a motion grows; infinite if none does up to ``top``."""
     for kmh in np.arange(50.0, top + step, step):
         if fastest_growth(train, contact, load, kmh / 3.6).real > 0.0:
             return float(kmh)

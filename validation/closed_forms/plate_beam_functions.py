@@ -1,10 +1,10 @@
 """Free rectangular plate by Leissa's own method: Ritz with products of free-free beam functions.
 
 A. W. Leissa, The free vibration of rectangular plates, J. Sound Vib. 31 (1973) 257-293: 36 terms, six beam functions
-in each direction. The functions' ends carry no moment and no shear of a beam, which are not the natural conditions of
-a plate (Poisson's terms are missing), so the frequencies lie above the exact ones, by up to 1.2 % for 36 terms; with
-more terms they come down slowly. What this module gives with six functions is what Leissa printed; Legendre
-polynomials (``plate_ritz``) converge to what is exact.
+in each direction. At their ends the functions carry no moment and no shear of a beam, which are not the natural
+conditions of a plate (Poisson's terms are missing), so the frequencies lie above the exact ones, by up to 1.2 % for 36
+terms; with more terms they decrease slowly. With six functions this module gives Leissa's printed values; Legendre
+polynomials (``plate_ritz``) converge to the exact ones.
 
 With t = x/L - 1/2 and cos(beta) cosh(beta) = 1, the elastic functions are
   cos(beta t)/cos(beta/2) + cosh(beta t)/cosh(beta/2),   sin(beta t)/sin(beta/2) + sinh(beta t)/sinh(beta/2).
@@ -29,8 +29,8 @@ def leissa_parameters(aspect: float, nu: float, count: int, functions: int = 6) 
     Args:
         aspect: a/b.
         nu: Poisson's ratio.
-        count: How many, three rigid motions left out.
-        functions: Beam functions in each direction, two rigid ones included.
+        count: Number of parameters, without the three rigid motions.
+        functions: Beam functions in each direction, including two rigid ones.
 
     Returns:
         Parameters, ascending, shape (count,).
@@ -38,7 +38,7 @@ def leissa_parameters(aspect: float, nu: float, count: int, functions: int = 6) 
     X, Y = _integrals(aspect, functions), _integrals(1.0, functions)
 
     def plate(i: int, j: int, k: int, l: int) -> Reals:
-        return np.kron(X[i][j], Y[k][l])
+        return np.asarray(np.kron(X[i][j], Y[k][l]), dtype=np.float64)
 
     cross = plate(2, 0, 0, 2)
     bending = plate(2, 2, 0, 0) + plate(0, 0, 2, 2) + nu * (cross + cross.T)

@@ -25,7 +25,7 @@ def frequencies(
     degree: int,
     bed: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Natural frequencies, the three rigid modes included.
+    """Natural frequencies, including the three rigid modes.
 
     Args:
         length: L [m].
@@ -44,7 +44,7 @@ def frequencies(
     Y = _integrals(width, degree)
 
     def plate(i: int, j: int, k: int, l: int) -> NDArray[np.float64]:
-        return np.kron(X[i][j], Y[k][l])
+        return np.asarray(np.kron(X[i][j], Y[k][l]), dtype=np.float64)
 
     cross = plate(2, 0, 0, 2)
     bending = plate(2, 2, 0, 0) + plate(0, 0, 2, 2) + nu * (cross + cross.T)

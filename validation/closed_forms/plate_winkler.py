@@ -1,4 +1,4 @@
-"""A point load on an endless thin plate on a Winkler bed (Hertz 1884, Westergaard 1926).
+"""A point load on an infinite thin plate on a Winkler bed (Hertz 1884, Westergaard 1926).
 
 D lap lap w + k w = P delta has, with the radius of relative stiffness l = (D/k)^(1/4), the solution
   w(r) = -P l^2 / (2 pi D) kei(r/l),   w(0) = P l^2 / (8 D) = P / (8 sqrt(k D)).
@@ -19,7 +19,7 @@ __all__ = ["mesh_excess", "point_load_deflection"]
 
 
 def point_load_deflection(load: float, rigidity: float, bed: float, r: Reals) -> Reals:
-    """Deflection of the endless plate.
+    """Deflection of the infinite plate.
 
     Args:
         load: P [N].
@@ -36,7 +36,7 @@ def point_load_deflection(load: float, rigidity: float, bed: float, r: Reals) ->
 
 
 def mesh_excess(dispersion: float, ratio: float) -> float:
-    """What a mesh adds to the deflection under the load, as a part of it.
+    """Excess of a mesh's deflection under the load, relative to the exact one.
 
     Args:
         dispersion: c, mean over the directions of the waves.

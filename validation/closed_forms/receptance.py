@@ -1,17 +1,18 @@
-r"""Receptance of an endless Timoshenko rail on discrete damped springs, by the transfer matrix of a span.
+r"""Receptance of an infinite Timoshenko rail on discrete damped springs, by the transfer matrix of a span.
 
-All is exp(i omega t). The state y = (w, theta, M, Q), M = EI theta', Q = S (w' - theta), obeys y' = A y with
+All quantities vary as exp(i omega t). The state y = (w, theta, M, Q), M = EI theta', Q = S (w' - theta), obeys y' = A
+y with
 
     w' = theta + Q / S,  theta' = M / EI,  M' = -Q - rho I omega^2 theta,  Q' = -m omega^2 w,
 
-a seat adds Z w = (k + i omega c) w to Q, a unit force takes 1 off. From just ahead of a load, the
-state one pitch on is T y, T = exp(A (d - x)) J exp(A x) x being the way from the load to the seat. Of T's eigenvectors
-two decay ahead (|lambda| < 1), two behind; the state jumps by (0, 0, 0, -1) from a sum of the latter to a sum of the
-former: four equations, no truncation (D. J. Mead, Free wave propagation in periodically supported, infinite beams,
-J. Sound Vib. 11 (1970) 181-197; T. X. Wu and D. J. Thompson, A double Timoshenko beam model for vertical vibration
+a seat adds Z w = (k + i omega c) w to Q, a unit force reduces Q by 1. From just ahead of a load, the state one pitch
+further is T y, T = exp(A (d - x)) J exp(A x), x being the distance from the load to the seat. Of T's eigenvectors two
+decay ahead (|lambda| < 1), two behind; the state jumps by (0, 0, 0, -1) from a sum of the latter to a sum of the
+former: four equations, no truncation (D. J. Mead, Free wave propagation in periodically supported, infinite beams, J.
+Sound Vib. 11 (1970) 181-197; T. X. Wu and D. J. Thompson, A double Timoshenko beam model for vertical vibration
 analysis of railway track at high frequencies, J. Sound Vib. 224 (1999) 329-348). A loss factor eta makes EI and S
 complex, E (1 + i eta); without one the receptance at mid-span is infinite at the pinned-pinned frequency, whose wave
-stands still with its nodes on the seats. Signs: w and force down.
+is a standing one with nodes on the seats. Signs: w and force down.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-r"""Simply supported beam under what moves over it at constant speed: force, mass, sprung mass.
+r"""Simply supported beam under a force, mass or sprung mass that moves at constant speed.
 
 L. Fryba, Vibration of solids and structures under moving loads (3rd ed., 1999), ch. 1 (force), 2 (mass, sprung mass).
 Euler beam, modes sin(k_i x), k_i = i pi / l, omega_i = k_i^2 sqrt(EI / m), Omega_i = k_i V, beam at rest at t = 0:
@@ -6,9 +6,9 @@ Euler beam, modes sin(k_i x), k_i = i pi / l, omega_i = k_i^2 sqrt(EI / m), Omeg
     force:        w = 2 P / (m l) sum_i sin(k_i x) [sin Omega_i t - (Omega_i / omega_i) sin omega_i t]
                                                                           / (omega_i^2 - Omega_i^2)
     mass:         q_i'' + omega_i^2 q_i = 2 / (m l) sin(k_i V t) F,  F = M [g - (w_tt + 2 V w_xt + V^2 w_xx)(V t, t)]
-    sprung mass:  F = M g + k (z - w) + c (z' - w_t - V w_x),  M z'' = M g - F, z from its place on a beam at rest
+    sprung mass:  F = M g + k (z - w) + c (z' - w_t - V w_x),  M z'' = M g - F, z from its position on a beam at rest
 
-The latter two are integrated with SciPy's explicit DOP853, no relative of the engine's method. The mass's own
+The latter two are integrated with SciPy's explicit DOP853, which is unrelated to the engine's method. The mass's own
 acceleration is eliminated from F first, so that the system is an explicit one:
 
     F = M (g - a) / (1 + 2 M / (m l) sum sin^2 k_i V t)
@@ -38,7 +38,7 @@ RTOL = 1e-7  # of the integration, a hundred times finer than what it judges
 
 @dataclass(frozen=True)
 class Crossing:
-    """A beam and what crosses it.
+    """A beam and the mass that crosses it.
 
     Attributes:
         EI: Bending stiffness [N m^2].
@@ -70,7 +70,7 @@ class Crossing:
 
     def wave_numbers(self, modes: int) -> Reals:
         """k_i [1/m], shape (modes,)."""
-        return np.arange(1, modes + 1) * np.pi / self.length
+        return np.arange(1.0, modes + 1) * np.pi / self.length
 
     def frequencies(self, modes: int) -> Reals:
         """omega_i [rad/s], shape (modes,)."""
@@ -88,7 +88,7 @@ def force_euler(crossing: Crossing, x: float, t: Reals, modes: int) -> Reals:
 
 
 def force_timoshenko(beam: Beam, crossing: Crossing, x: float, t: Reals, modes: int) -> Reals:
-    """The same on a Timoshenko beam, both branches."""
+    """Deflection at x of a Timoshenko beam under a moving force [m], shape of t; both branches."""
     k, total = crossing.wave_numbers(modes), np.zeros(len(t))
     Omega = k * crossing.V
     for omega in pinned_frequencies(beam, crossing.length, modes):
@@ -104,7 +104,7 @@ def moving_mass(crossing: Crossing, x: float, t: Reals, modes: int) -> Reals:
 
     Args:
         crossing: Beam and mass.
-        x: Place [m].
+        x: Position [m].
         t: Instants while it is on the beam [s], ascending, shape (n,).
         modes: Modes of the beam.
 
@@ -125,11 +125,11 @@ def moving_mass(crossing: Crossing, x: float, t: Reals, modes: int) -> Reals:
 
 
 def sprung_mass(crossing: Crossing, x: float, t: Reals, modes: int) -> tuple[Reals, Reals]:
-    """Deflection at x, and what the sprung mass does; it arrives at rest in its static place.
+    """Deflection at x, and displacement of the sprung mass, which arrives at rest in its static position.
 
     Args:
         crossing: Beam, mass, spring and damper.
-        x: Place [m].
+        x: Position [m].
         t: Instants while it is on the beam [s], ascending, shape (n,).
         modes: Modes of the beam.
 
@@ -151,7 +151,7 @@ def sprung_mass(crossing: Crossing, x: float, t: Reals, modes: int) -> tuple[Rea
 
 
 def _integrate(rate: Callable[[float, Reals], Reals], size: int, t: Reals) -> Reals:
-    """From rest; shape (size, n)."""
+    """Integrate from rest; shape (size, n)."""
     found = solve_ivp(rate, (0.0, float(t[-1])), np.zeros(size), method="DOP853", t_eval=t, rtol=RTOL, atol=1e-13)
     if not found.success:
         raise RuntimeError(found.message)

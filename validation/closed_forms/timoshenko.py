@@ -1,4 +1,4 @@
-"""Timoshenko beam: pinned modes, and a load that moves on an endless one on a continuous foundation.
+"""Timoshenko beam: pinned modes, and a load that moves on an infinite one on a continuous foundation.
 
 m w_tt = kGA (w'' - theta') - k w - c w_t + P delta,   rho I theta_tt = EI theta'' + kGA (w' - theta).
 """
@@ -16,7 +16,7 @@ __all__ = ["Beam", "moving_load_deflection", "pinned_frequencies", "static_missi
 
 @dataclass(frozen=True)
 class Beam:
-    """A beam's numbers.
+    """Stiffness and inertia of a beam.
 
     Attributes:
         EI: Bending stiffness [N m^2].
@@ -32,7 +32,7 @@ class Beam:
 
 
 def pinned_frequencies(beam: Beam, length: float, modes: int) -> Reals:
-    """Both branches of the pinned beam's frequencies.
+    """Frequencies of the pinned beam, both branches.
 
     m rho_I omega^4 - [m (EI k^2 + kGA) + rho_I kGA k^2] omega^2 + kGA EI k^4 = 0 with k = n pi / l.
 
@@ -53,7 +53,7 @@ def pinned_frequencies(beam: Beam, length: float, modes: int) -> Reals:
 
 
 def moving_load_deflection(beam: Beam, k: float, c: float, V: float, P: float, s: Reals) -> Reals:
-    """Deflection of an endless beam under a constant load that moves at V, in the load's frame.
+    """Deflection of an infinite beam under a constant load that moves at V, in the load's frame.
 
     Fourier transform over s = x - V t turns the equations into w(xi) = P B / D with
     B = (EI - rho_I V^2) xi^2 + kGA and D = [(kGA - m V^2) xi^2 - i c V xi + k] B - kGA^2 xi^2;
@@ -65,7 +65,7 @@ def moving_load_deflection(beam: Beam, k: float, c: float, V: float, P: float, s
         c: Its damping [N s/m^2], above 0 or V below the critical speed.
         V: Speed [m/s].
         P: Load [N].
-        s: Places ahead of the load [m], shape (n,).
+        s: Positions ahead of the load [m], shape (n,).
 
     Returns:
         w [m], shape (n,).

@@ -7,9 +7,10 @@ foundation k per length; its static shape under a load, exp(-x)(cos x + sin x) o
 gives k_t = 8 EI beta^3 and, by kinetic energy, m_r = 3 m/(2 beta), the damper likewise c_t = 3 c/(2 beta). P2 is the
 lower of the two natural frequencies (the upper is P1).
 
-Better, and to see how crude that is: the receptance alpha of a Timoshenko beam under its load on a damped foundation in
-series with a slab on its bed. By Fourier transform along the rail, with k_b = k_bed + i omega c_bed - omega^2 m_slab
-(a slab without bending stiffness: it follows the load) and K(omega) = 1/(1/(k + i omega c) + 1/k_b) - m omega^2,
+A better model, which shows the error of this one: the receptance alpha of a Timoshenko beam under its load on a damped
+foundation in series with a slab on its bed. By Fourier transform along the rail, with k_b = k_bed + i omega c_bed -
+omega^2 m_slab (a slab without bending stiffness: it follows the load) and K(omega) = 1/(1/(k + i omega c) + 1/k_b) - m
+omega^2,
 
     alpha = 1/(2 pi) int B/D dxi,  B = EI xi^2 + kGA - rho I omega^2,  D = (kGA xi^2 + K) B - (kGA xi)^2,
 
@@ -35,7 +36,7 @@ class WheelOnTrack:
     """A wheel on a rail on a continuous foundation.
 
     Attributes:
-        unsprung: Mass of a wheel and its share of what moves with it, m_u [kg].
+        unsprung: Mass of a wheel with its share of the axle, m_u [kg].
         contact: Linearised contact spring k_H [N/m].
         EI: Bending stiffness of the rail [N m^2].
         m: Mass of the rail per length [kg/m].
@@ -43,10 +44,10 @@ class WheelOnTrack:
         c: Its damping [N s/m^2].
         kGA: Shear stiffness of the rail [N].
         rho_I: Its rotary inertia per length [kg m].
-        bed: What the foundation stands on [N/m^2].
+        bed: Stiffness below the foundation [N/m^2].
         bed_damping: Its damping [N s/m^2].
         bed_mass: Mass between foundation and bed per length [kg/m].
-        primary_stiffness: Of the suspension above the wheel, k_p [N/m].
+        primary_stiffness: Stiffness of the suspension above the wheel, k_p [N/m].
         primary_damping: c_p [N s/m].
     """
 
@@ -81,7 +82,7 @@ class WheelOnTrack:
 
 
 def two_mass_frequencies(system: WheelOnTrack) -> tuple[float, float]:
-    """P2 and P1, undamped [Hz]."""
+    """Undamped frequencies P2 and P1 [Hz]."""
     k, K = system.contact, np.array([[system.contact, -system.contact], [-system.contact, system.contact]])
     K[1, 1] = k + system.track_stiffness
     root = np.sqrt([system.unsprung, system.track_mass])
@@ -90,12 +91,12 @@ def two_mass_frequencies(system: WheelOnTrack) -> tuple[float, float]:
 
 
 def beam_receptance(system: WheelOnTrack, frequency: Reals, distance: float = 0.0) -> NDArray[np.complex128]:
-    """Deflection of the endless rail under a harmonic force of 1 N, alpha [m/N], shape (n,).
+    """Deflection of the infinite rail under a harmonic force of 1 N, alpha [m/N], shape (n,).
 
     Args:
-        system: Of it the track; an infinite kGA makes an Euler beam.
+        system: Source of the track's data; an infinite kGA gives an Euler beam.
         frequency: Frequencies [Hz], shape (n,).
-        distance: From the force to where it is felt [m].
+        distance: Distance from the force to the point of the deflection [m].
     """
     s, found = system, np.empty(len(frequency), dtype=np.complex128)
     flexible = 0.0 if np.isinf(s.kGA) else 1.0 / s.kGA
@@ -133,7 +134,7 @@ def force_per_roughness(system: WheelOnTrack, frequency: Reals, *, lumped: bool 
 
 
 def peak(frequency: Reals, values: Reals) -> float:
-    """Place of the largest value, by a parabola through it and its neighbours [the frequency's unit]."""
+    """Position of the largest value, by a parabola through it and its neighbours [unit of the frequency]."""
     i = int(np.clip(np.argmax(values), 1, len(values) - 2))
     before, here, after = values[i - 1 : i + 2]
     return float(

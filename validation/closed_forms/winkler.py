@@ -1,4 +1,4 @@
-r"""Endless Euler beam on a continuous foundation under a load that moves at constant speed.
+r"""Infinite Euler beam on a continuous foundation under a load that moves at constant speed.
 
 J. T. Kenney, Steady-state vibrations of beam on elastic foundation for moving load, J. Appl. Mech. 21 (1954) 359-364;
 L. Fryba, Vibration of solids and structures under moving loads (3rd ed., 1999), ch. 13. With s = x - V t, everything
@@ -26,7 +26,7 @@ __all__ = ["critical_speed", "damped_deflection", "undamped_deflection"]
 
 
 def critical_speed(EI: float, m: float, k: float) -> float:
-    """V_cr, above which an undamped foundation radiates [m/s]."""
+    """Critical speed V_cr, above which the beam radiates waves [m/s]."""
     return float(np.sqrt(np.sqrt(4.0 * k * EI) / m))
 
 
@@ -39,7 +39,7 @@ def undamped_deflection(EI: float, m: float, k: float, V: float, P: float, s: Re
         k: Foundation [N/m^2].
         V: Speed [m/s].
         P: Load [N].
-        s: Places ahead of the load [m], shape (n,).
+        s: Positions ahead of the load [m], shape (n,).
 
     Returns:
         w [m], shape (n,).
@@ -59,7 +59,7 @@ def damped_deflection(EI: float, m: float, k: float, c: float, V: float, P: floa
         c: Its damping [N s/m^2], above 0.
         V: Speed [m/s].
         P: Load [N].
-        s: Places ahead of the load [m], shape (n,).
+        s: Positions ahead of the load [m], shape (n,).
 
     Returns:
         w [m], shape (n,).

@@ -1,4 +1,4 @@
-"""Figures and table of the convergence study (``convergence``): ``python -m validation convergence``."""
+"""Figures and table of the convergence study: ``python -m validation convergence``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["draw", "real_time_factor", "table", "write"]
 
 SEAT_PITCH = 0.63  # m
 REPORT = Path(__file__).parents[1] / "report"
-COLOURS = {"vertical": "#0072B2", "lateral": "#D55E00"}  # of Okabe and Ito, told apart by any eye
+COLOURS = {"vertical": "#0072B2", "lateral": "#D55E00"}  # Okabe-Ito palette, distinct for colour-blind readers
 MARKS = {"rms": "o", "p99": "s", "largest": "^"}
 NORMS = {
     "rms": "rms over standard deviation",
@@ -24,7 +24,7 @@ NORMS = {
 }
 CAVEAT = (
     "The converged run shares its window with the last three settings and its step with the strict one, so that part of"
-    " their errors cancels; what that hides, and what the converged run errs, is told in `validation/convergence.py`."
+    " their errors cancels; `validation/convergence/study.py` states how much that is."
 )
 NUMBERS: dict[str, tuple[str, Callable[[Setting], float], float]] = {
     "dt": ("time step [s]", lambda s: s.dt, PRESENT.dt),
@@ -32,19 +32,19 @@ NUMBERS: dict[str, tuple[str, Callable[[Setting], float], float]] = {
     "mesh": ("elements of a slab", lambda s: float(s.mesh[0] * s.mesh[1]), float(np.prod(PRESENT.mesh))),
     "window": ("length of the window [m]", lambda s: s.window, PRESENT.window),
 }
-"""Label of an axis, its number, the number of the present default."""
+"""Label of an axis, its value of a setting, its value of the first default."""
 
 
 def draw(folder: Path) -> list[Path]:
-    """One figure for each axis, ``convergence_<axis>.png``.
+    """Draw one figure for each axis, ``convergence_<axis>.png``.
 
     Args:
-        folder: Where they are written.
+        folder: Folder of the files.
 
     Returns:
         The files.
     """
-    import matplotlib as mpl  # here: the table does not need it
+    import matplotlib as mpl  # imported here, since the table does not need it
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
@@ -70,7 +70,7 @@ def draw(folder: Path) -> list[Path]:
 
 
 def _draw_errors(panel: Any, name: str, axis: Axis, direction: str) -> None:
-    """Errors of one force over the axis' number; without correction solid, with it dashed."""
+    """Draw the errors of one force over the values of an axis; without correction solid, with it dashed."""
     label, number, present = NUMBERS[name]
     for truncation, line in (("none", "-"), ("local", "--")):
         runs = [run for run in axis.runs if run.truncation == truncation]
@@ -108,7 +108,7 @@ def _draw_errors(panel: Any, name: str, axis: Axis, direction: str) -> None:
 
 
 def _first(runs: Sequence[Setting], number: Callable[[Setting], float]) -> list[Setting]:
-    """One run for each number, ascending."""
+    """One run for each value, ascending."""
     return [run for _, run in sorted({number(run): run for run in runs}.items())]
 
 
@@ -117,15 +117,15 @@ def _tick(name: str, run: Setting, number: Callable[[Setting], float]) -> str:
 
 
 def table() -> str:
-    """Markdown: errors of every axis and of whole settings, wall time over that of the present default."""
+    """Markdown table: errors of every axis and of whole settings, wall times over that of the first default."""
     default = real_time_factor(PRESENT, runs=3)
     lines = [
         "# Convergence",
         "",
         "Errors in % of the peak (rms: of the standard deviation), vertical / lateral; *largest* while all wheels",
-        "are on the rails, *landing* with everything included; see the head of `validation/convergence.py`. *time*:",
-        f"wall time of the steps over that of the first default ({default:.2f} s a second here, the fastest of three;",
-        "other programs were running, so factors of up to two are noise).",
+        "are on the rails, *landing* with everything included; see the head of `validation/convergence/study.py`.",
+        f"*time*: wall time of the steps over that of the first default ({default:.2f} s per simulated second here,",
+        "the fastest of three; other programs were running, so factors of up to two are noise).",
     ]
     for axis in AXES.values():
         lines += ["", f"**{axis.title}**, against {axis.finest.label}", "", *_head("setting")]
@@ -141,11 +141,11 @@ def table() -> str:
 
 
 def real_time_factor(setting: Setting, runs: int = 1) -> float:
-    """Wall time of the steps over time simulated; noisy on a shared machine.
+    """Wall time of the steps over simulated time; noisy on a shared machine.
 
     Args:
-        setting: What is run.
-        runs: Runs to take the fastest of; one is the run that the errors are from.
+        setting: Setting to run.
+        runs: Number of runs, of which the fastest counts; one means the run of the errors.
     """
     again = [simulate.__wrapped__("default", *setting.overrides) for _ in range(runs - 1)]
     return min(float(run.facts["real_time_factor"]) for run in (setting.run, *again))
@@ -163,10 +163,10 @@ def _line(name: str, run: Setting, finest: Setting, default: float) -> str:
 
 
 def write(folder: Path = REPORT) -> None:
-    """Figures and ``convergence.md``.
+    """Write the figures and ``convergence.md``.
 
     Args:
-        folder: Where they are written.
+        folder: Folder of the files.
     """
     folder.mkdir(parents=True, exist_ok=True)
     draw(folder)

@@ -1,8 +1,8 @@
-"""Convergence with sines and seats that are points: time step, modes, slab mesh, window; what settings cost and err.
+"""Convergence with sines and point seats: time step, modes per metre, slab mesh, window; cost and error of settings.
 
 One realisation of the default scenario's track and train, 350 km/h, is run from the same chainage with one setting
 varied at a time (a star: the errors hardly depend on the other settings) and with all settings refined. References are
-our own finest runs. Statistics leave out the first 40 m. Norms, over all eight wheels, of the vertical or lateral
+the engine's own finest runs. Statistics omit the first 40 m. Norms, over all eight wheels, of the vertical or lateral
 force's difference:
 
   largest   largest, over the largest force, while all wheels are on the rails and for 1.5 m after they landed
@@ -12,16 +12,16 @@ force's difference:
 
 Here the left wheels leave the rail over one dip. A landing 0.1 ms sooner or later changes the steep front of its force
 by a tenth of the peak without any meaning for the force that follows, so ``landing`` is listed but not judged; the
-neighbouring wheels feel the blow through the rail, so ``largest`` leaves out the time for all wheels.
+neighbouring wheels are affected through the rail, so ``largest`` omits that time for all wheels.
 
 Modes: every seat excites harmonics of its passing frequency, 154 Hz here, because point supports put kinks into the
 rail. The j-th harmonic is a rail wave of 0.63 m/j and needs more than 2 j / 0.63 m = 3.17 j modes per metre; so the
 error falls in steps, at 3.2, 6.3, 9.5, ... modes per metre. The converged run has 13 of them; 16 modes per metre with
-five passes differ from 13 (window 24 m, mesh 9 x 2) by 0.3 / 0.4 % in ``largest`` and 0.2 / 0.2 % in ``p99``
-(vertical / lateral), which is what the reference itself may err. Beyond 8 modes per metre two passes at 1e-4 s are
-not enough. The converged run shares its window with the two recommended settings and its step with the strict one, so
-that such errors cancel in part: a step of 5e-5 s and a window of 36 m (strict: 32 m) move the recommended force by
-0.20 / 0.31 % in ``p99`` and the strict one by 0.30 / 0.53 % in ``largest``, to be added to what the table says.
+five passes differ from 13 (window 24 m, mesh 9 x 2) by 0.3 / 0.4 % in ``largest`` and 0.2 / 0.2 % in ``p99`` (vertical
+/ lateral), which is the possible error of the reference itself. Beyond 8 modes per metre two passes at 1e-4 s are not
+enough. The converged run shares its window with the two recommended settings and its step with the strict one, so that
+such errors cancel in part: a step of 5e-5 s and a window of 36 m (strict: 32 m) move the recommended force by 0.20 /
+0.31 % in ``p99`` and the strict one by 0.30 / 0.53 % in ``largest``, to be added to what the table says.
 """
 
 from __future__ import annotations
@@ -43,21 +43,21 @@ __all__ = [
     "Setting", "error",
 ]  # fmt: skip
 
-START, WAY, RUN_IN = 40.0, 150.0, 40.0  # m; the longest window ends at 70 m then, its rear at 10 m
+START, DISTANCE, RUN_IN = 40.0, 150.0, 40.0  # m; the longest window ends at 70 m then, its rear at 10 m
 BEFORE_LIFT, AFTER_LANDING = 0.3, 1.5  # m; errors do not depend on more
 DIRECTIONS = ("vertical", "lateral")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """What the study varies; the values are those of a default user's run but for the step.
+    """Settings that the study varies; apart from the step, the values are those of the first default.
 
     Attributes:
         dt: Time step [s].
         modes: Trial functions per field and metre [1/m].
         mesh: Elements of a slab along and across.
-        window: Its length [m].
-        truncation: Correction for the modes left out.
+        window: Length of the window [m].
+        truncation: Correction for the omitted modes.
         passes: Passes of the explicit half; more than two only where many modes slow their convergence.
     """
 
@@ -70,7 +70,7 @@ class Setting:
 
     @property
     def label(self) -> str:
-        """As a line of the table."""
+        """Text of a line of the table."""
         nx, ny = self.mesh
         passes = "" if self.passes == 2 else f", {self.passes} passes"
         return f"{self.dt:g} s, {self.modes:.3g} /m {self.truncation}, {nx} x {ny}, {self.window:g} m{passes}"
@@ -81,7 +81,7 @@ class Setting:
         nx, ny = self.mesh
         return (
             f"train.start={START}",
-            f"train.distance={WAY}",
+            f"train.distance={DISTANCE}",
             f"track.slab={{like='CRTS_III', elements_x={nx}, elements_y={ny}}}",
             "track.fastening={like='ACE2021', length=0.0}",
             'numerics.trial_functions="sines"',
@@ -95,7 +95,7 @@ class Setting:
 
     @property
     def run(self) -> Forces:
-        """The run, made once a session."""
+        """Forces of the run, which is made once per session."""
         return simulate("default", *self.overrides)
 
 
@@ -111,11 +111,11 @@ class Errors:
 
 @cache
 def error(run: Setting, finest: Setting, direction: str) -> Errors:
-    """How far a run is from another one.
+    """Difference of a run from a reference.
 
     Args:
-        run: What is judged.
-        finest: The reference.
+        run: Run to judge.
+        finest: Reference.
         direction: ``"vertical"`` or ``"lateral"``.
     """
     first, second = run.run, finest.run
@@ -136,7 +136,7 @@ def error(run: Setting, finest: Setting, direction: str) -> Errors:
 
 
 def _on_rails(run: Forces, samples: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Samples away from any wheel's lift-off and landing, shape (n,)."""
+    """Whether a sample is away from any wheel's lift-off and landing, shape (n,)."""
     position = run.position[samples]
     lifted = position[(run.normal[samples] <= 0.0).any(axis=(1, 2))]
     distance = position[:, None] - lifted
@@ -149,7 +149,7 @@ class Axis:
     """Runs that differ in one setting.
 
     Attributes:
-        title: What varies.
+        title: Name of the setting.
         finest: Their reference.
         runs: Coarse to fine.
     """
@@ -164,9 +164,9 @@ CONVERGED = Setting(modes=13.0, mesh=(18, 4), window=28.0, passes=3)
 PRESENT = Setting(dt=2e-4)
 """The default when this study was made."""
 RECOMMENDED = replace(PRESENT, modes=6.5, window=28.0, truncation="local")
-"""Cheapest tried within 1 % of the peak in 99 % of the time, both forces; by ``largest`` it is not, laterally."""
+"""Cheapest tried setting within 1 % of the peak for 99 % of the time; laterally its ``largest`` is above 1 %."""
 STRICT = Setting(modes=10.0, mesh=(9, 4), window=28.0, truncation="local")
-"""Cheapest tried within 1 % of the peak while the wheels are on the rails; landings are not."""
+"""Cheapest tried setting within 1 % of the peak while the wheels are on the rails; landings are not."""
 _MODES = replace(CONVERGED, passes=2)
 _BASE = Setting(dt=2e-4, modes=4.0, window=28.0)
 _WINDOWS = replace(_BASE, modes=2.0)
@@ -201,7 +201,7 @@ TOTALS = {
 
 
 def _falls(axis: str, truncation: str, direction: str) -> float:
-    """Smallest ratio of an axis' successive rms errors."""
+    """Smallest ratio of successive rms errors of an axis."""
     runs = [run for run in AXES[axis].runs if run.truncation == truncation]
     sizes = [error(run, AXES[axis].finest, direction).rms for run in runs]
     return min(coarse / fine for coarse, fine in pairwise(sizes))
@@ -230,7 +230,7 @@ CASES = (
             name=f"convergence-{axis}{'' if truncation == 'none' else '-' + truncation}-{direction}",
             kind="convergence",
             quantity=f"{AXES[axis].title.lower()}{words}, {direction} force: smallest ratio of successive rms errors",
-            source=f"our own run at {AXES[axis].finest.label}",
+            source=f"own run at {AXES[axis].finest.label}",
             reference=1.0,
             rule="at least",
             why="every refinement lowers the error",
@@ -263,19 +263,19 @@ CASES = (
         name="convergence-window-36",
         kind="convergence",
         quantity="error of a window of 36 m, largest over peak with the wheels on the rails [%], vertical and lateral",
-        source=f"our own run at {AXES['window'].finest.label}",
+        source=f"own run at {AXES['window'].finest.label}",
         reference=(0.25, 0.25),
         rule="at most",
-        why="a quarter of the 1 % that all settings together may err",
+        why="a quarter of the 1 % allowed for all settings together",
         compute=lambda: [error(*_WINDOW_36, direction).largest for direction in DIRECTIONS],
     ),
     Case(
         name="convergence-present",
         kind="information",
         quantity="error of 2 modes/m in 36 m, 2e-4 s, 9 x 2 [%]: largest, p99, rms, landing; vertical, then lateral",
-        source=f"our own run at {CONVERGED.label}",
+        source=f"own run at {CONVERGED.label}",
         reference=np.full(8, np.nan),
-        why="waves of the seats' passing that 2 modes a metre leave out",
+        why="waves of seat passing that 2 modes per metre omit",
         compute=lambda: _both(PRESENT, CONVERGED).ravel(),
         quick=False,
     ),
@@ -284,10 +284,10 @@ CASES = (
             name=f"convergence-{name}",
             kind="convergence",
             quantity=f"error of {run.label}: {words}, over the peak [%], vertical and lateral",
-            source=f"our own run at {CONVERGED.label}",
+            source=f"own run at {CONVERGED.label}",
             reference=(1.0, 1.0),
             rule="at most",
-            why="what the default is chosen for",
+            why="criterion for the choice of the default",
             compute=lambda run=run, norm=norm: _bounded(run, norm),
             quick=False,
         )

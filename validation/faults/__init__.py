@@ -1,1 +1,1 @@
-"""Faults: runs that are killed, starved of disk, disturbed; one command: ``python -m validation.faults``."""
+"""Fault injection: runs that are killed, disturbed or out of disk space; ``python -m validation.faults``."""

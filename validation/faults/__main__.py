@@ -1,4 +1,4 @@
-"""Command line: ``python -m validation.faults``."""
+"""Command line ``python -m validation.faults``."""
 
 from __future__ import annotations
 
@@ -21,13 +21,15 @@ QUICK = 0.1  # of all repeats
 
 
 @click.command()
-@click.option("--quick", is_flag=True, help="A tenth of all repeats.")
-@click.option("--only", multiple=True, type=click.Choice(tuple(PARTS)), help="Only this part; may be repeated.")
-@click.option("--jobs", type=click.IntRange(1), default=2, show_default=True, help="Parts at a time.")
-@click.option("--draw", is_flag=True, help="Do nothing; table and page from the file as it is.")
+@click.option("--quick", is_flag=True, help="Run a tenth of all repeats.")
+@click.option("--only", multiple=True, type=click.Choice(tuple(PARTS)), help="Run only this part; may be repeated.")
+@click.option(
+    "--jobs", type=click.IntRange(1), default=2, show_default=True, help="Number of parts that run at a time."
+)
+@click.option("--draw", is_flag=True, help="Run nothing; make table and page from the kept findings.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), default=REPORT, help="Folder of the report.")
 def main(quick: bool, only: tuple[str, ...], jobs: int, draw: bool, output: Path) -> None:
-    """Kill, starve and disturb runs; parts not chosen keep what was found before."""
+    """Kill and disturb runs, fill their disks; parts not chosen keep their earlier findings."""
     console = Console(highlight=False)
     if not console.is_terminal:
         console = Console(highlight=False, width=PIPE_WIDTH)
@@ -53,7 +55,7 @@ def main(quick: bool, only: tuple[str, ...], jobs: int, draw: bool, output: Path
 
 
 def _read(file: Path) -> dict[str, Any]:
-    """Parts that a file keeps, by name; none if there is no such file or it is of another version."""
+    """Parts of a file of findings, by name; none if the file is missing or of another version."""
     if not file.is_file():
         return {}
     kept = json.loads(file.read_text(encoding="utf-8"))
@@ -63,7 +65,7 @@ def _read(file: Path) -> dict[str, Any]:
 
 
 def _write(file: Path, known: dict[str, Any], output: Path) -> None:
-    """File and page."""
+    """Write the file of findings and the page."""
     content = {"format": FORMAT, "format_version": FORMAT_VERSION, "parts": known}
     file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     ordered = {name: known[name] for name in PARTS if name in known}

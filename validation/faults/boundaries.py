@@ -1,9 +1,9 @@
-"""Death at every boundary between two system calls of a small session of the writer.
+"""Death between any two system calls of a small session of the writer.
 
 A copy of this process writes a small result, with checkpoints, and ends itself right before its n-th call that changes
-the disk: opening for writing, write, truncate, fsync, rename, unlink; once more in the middle of every write. Then the
-file must be as of the last commit, or of the one that was under way. The same for writers that replace an older file
-or go on with one, and for whoever completes the commit of a dead one.
+the disk: opening for writing, write, truncate, fsync, rename, unlink; and also in the middle of every write. The file
+must then be as of the last commit, or of the one in progress. The same holds for writers that replace an older file or
+continue one, and for the program that completes the commit of a dead one.
 """
 
 from __future__ import annotations
@@ -38,20 +38,20 @@ GROUPS = {
     "body": GroupSpec.standard("body", ("displacement",)),
 }
 LABELS = TrainLabels(["coach"], ["car"], np.zeros(2, np.int64), np.array([1.0, -1.0]))
-SAMPLES = (700, 500, 900)  # of each block: the last chunk of a dataset is changed in place, and new ones are added
+SAMPLES = (700, 500, 900)  # rows of each block: the last chunk of a dataset is changed in place, and new ones are added
 
 
 @dataclass
 class Boundaries:
-    """What came of it.
+    """Findings of all sessions.
 
     Attributes:
         sessions: Number of system calls of each session.
         deaths: How often a session died.
-        as_before, as_after: How often the file was as of the last commit, or of the one under way.
-        by_journal: How often plain h5py could not read the one or the other until the journal was carried out.
-        twice: Deaths of those who carry out a journal.
-        wrong: What was not as it should be.
+        as_before, as_after: How often the file was as of the last commit, or of the one in progress.
+        by_journal: How often plain h5py could not read the file until the journal was applied.
+        twice: Deaths while a journal was applied.
+        wrong: Errors found.
     """
 
     sessions: dict[str, int] = field(default_factory=dict)
@@ -64,7 +64,7 @@ class Boundaries:
 
 
 def boundaries(stride: int = 1) -> Boundaries:
-    """Every session, dying at every ``stride``-th call."""
+    """Run every session, dying at every ``stride``-th call."""
     found = Boundaries()
     with TemporaryDirectory(prefix="tiengine-faults-", dir=memory_folder()) as folder:
         for name, (session, prepare) in SESSIONS.items():
@@ -80,7 +80,7 @@ def _fresh(folder: Path, force: bool = False) -> None:
 
 
 def _resumed(folder: Path) -> None:
-    """Go on with what :func:`_broken_off` has left."""
+    """Continue the file that :func:`_broken_off` has left."""
     with Writer.resume(folder / NAME, GROUPS) as writer:
         saved = Checkpoint.read(checkpoint_path(folder / NAME, 0))
         writer.add(0, LABELS, {"status": "running"})
@@ -91,7 +91,7 @@ def _resumed(folder: Path) -> None:
 def _blocks(writer: Writer, first: int) -> None:
     for number in range(first, len(SAMPLES)):
         writer.write(0, _block(number))
-        writer.note(0, [Event("wheel_lift", 0.1 * number, 1.0, 1, "left", f"block {number}", False)])
+        writer.add_events(0, [Event("wheel_lift", 0.1 * number, 1.0, 1, "left", f"block {number}", False)])
         writer.commit()
         Checkpoint(0, {"rows": writer.rows(0), "blocks": number + 1}, {"state": np.arange(500.0)}).write(_path(writer))
     writer.describe(0, {"status": "complete"})
@@ -103,7 +103,7 @@ def _blocks(writer: Writer, first: int) -> None:
 def _block(number: int) -> dict[str, Block]:
     count = SAMPLES[number]
     rng = np.random.default_rng(number)
-    time = np.arange(count) + 1000.0 * number
+    time = np.arange(0.0, count) + 1000.0 * number
     wheel = {name: rng.standard_normal((count, 2, 2)) for name in GROUPS["wheel"].channels}
     body = {"displacement": rng.standard_normal((count, 1, len(DOFS)))}
     return {"wheel": Block(time, time, wheel), "body": Block(time, time, body)}
@@ -114,11 +114,11 @@ def _path(writer: Writer) -> Path:
 
 
 def _nothing(folder: Path) -> None:
-    """Nothing is there before."""
+    """Start from an empty folder."""
 
 
 def _older(folder: Path) -> None:
-    """An older result with a journal of its last commit, torn, and a checkpoint: a crash left it."""
+    """Start from an older result with a torn journal of its last commit and a checkpoint, as a crash leaves them."""
     _broken_off(folder)
     journal = journal_of(folder / NAME)
     in_copy(lambda: _resumed(folder), lambda call: call.kind == "unlink" and call.path.suffix == ".journal")
@@ -126,7 +126,7 @@ def _older(folder: Path) -> None:
 
 
 def _broken_off(folder: Path) -> None:
-    """A run that died after its first checkpoint."""
+    """Start from a run that died after its first checkpoint."""
     left = [2]
 
     def after_the_first(call: Call) -> bool:
@@ -140,7 +140,7 @@ def _broken_off(folder: Path) -> None:
 SESSIONS: dict[str, tuple[Callable[[Path], None], Callable[[Path], None]]] = {
     "a new file": (_fresh, _nothing),
     "instead of an older one": (lambda folder: _fresh(folder, force=True), _older),
-    "going on after a death": (_resumed, _broken_off),
+    "resuming after a death": (_resumed, _broken_off),
 }
 
 
@@ -152,7 +152,7 @@ def _try(
     stride: int,
     found: Boundaries,
 ) -> None:
-    """Let a session die at every boundary."""
+    """Let a session die before every call."""
     template = new_folder(folder / "template")
     prepare(template)
     calls, states = states_of(session, shutil.copytree(template, folder / "whole"))
@@ -171,11 +171,11 @@ def _try(
 
 
 def states_of(session: Callable[[Path], None], folder: Path) -> tuple[list[str], list[tuple[int, Any]]]:
-    """Calls of a whole session; after how many of them, in what state its file is, commit by commit.
+    """Calls of a whole session, and the state of its file at every commit with the number of calls before it.
 
     Args:
-        session: Is carried out in a copy of this process.
-        folder: Where.
+        session: Function to call in a copy of this process.
+        folder: Working folder.
     """
     from tiengine.result_files import output_file
 
@@ -186,7 +186,7 @@ def states_of(session: Callable[[Path], None], folder: Path) -> tuple[list[str],
     def kept(of: Any) -> Any:
         def call(self: Any, *rest: Any) -> Any:
             answer = of(self, *rest)
-            with suppress(FileNotFoundError):  # that is still under its temporary name
+            with suppress(FileNotFoundError):  # the file still has its temporary name
                 shutil.copy(folder / NAME, folder / f"state.{len(calls)}")
             return answer
 
@@ -214,14 +214,14 @@ def states_of(session: Callable[[Path], None], folder: Path) -> tuple[list[str],
 def check_left(
     folder: Path, allowed: list[Any], where: str, found: Boundaries, journals: set[bytes] | None = None
 ) -> None:
-    """Look at what a dead session has left.
+    """Check the files of a dead session.
 
     Args:
-        folder: Where it worked.
-        allowed: States that its file may have, the last commit's first.
-        where: Words for what is wrong.
-        found: Is added to.
-        journals: Those whose carrying-out was broken off before; None breaks off none.
+        folder: Its working folder.
+        allowed: States that its file may have, that of the last commit first.
+        where: Description for messages.
+        found: Findings to add to.
+        journals: Journals whose application was interrupted before; None interrupts none.
     """
     path = folder / NAME
     if not journal_of(path).exists():
@@ -248,7 +248,7 @@ def check_left(
 
 
 def _check_going_on(path: Path, where: str, found: Boundaries) -> None:
-    """The checkpoint fits the file; nothing is left once somebody has gone on with it."""
+    """The checkpoint fits the file; nothing else is left after the run has been continued."""
     try:
         with Writer.resume(path, GROUPS) as writer:
             for each in checkpoint_paths(path):
@@ -263,7 +263,7 @@ def _check_going_on(path: Path, where: str, found: Boundaries) -> None:
 
 
 def _die_completing(folder: Path, allowed: list[Any], where: str, found: Boundaries) -> None:
-    """Whoever carries out the journal dies as well, at every boundary."""
+    """Apply the journal and die before every call of that."""
     n = 0
     while True:
         again = shutil.copytree(folder, folder.with_name("again"))
@@ -271,7 +271,7 @@ def _die_completing(folder: Path, allowed: list[Any], where: str, found: Boundar
         found.twice += status == DIED
         results.open(again / NAME).close()
         if _state(again) not in allowed:
-            found.wrong.append(f"{where}: other contents after the journal was broken off before call {n}")
+            found.wrong.append(f"{where}: other contents after the journal was interrupted before call {n}")
         shutil.rmtree(again)
         n += 1
         if status != DIED:
@@ -279,7 +279,7 @@ def _die_completing(folder: Path, allowed: list[Any], where: str, found: Boundar
 
 
 def _state(folder: Path) -> Any:
-    """Contents of the file; None if there is none, a word if it does not open."""
+    """Contents of the file; None if there is no file, a word if it does not open."""
     path = folder / NAME
     if not path.exists():
         return None
@@ -290,18 +290,18 @@ def _state(folder: Path) -> Any:
 
 
 def _settled(folder: Path) -> Any:
-    """Its state once a pending journal was carried out."""
+    """State of the file after a pending journal was applied."""
     if (folder / NAME).exists():
         results.open(folder / NAME).close()
     return _state(folder)
 
 
 def new_folder(folder: Path) -> Path:
-    """Make a folder."""
+    """Make an empty folder."""
     folder.mkdir(parents=True)
     return folder
 
 
 def memory_folder() -> str | None:
-    """A folder in memory, where fsync takes no time; None where there is none."""
+    """Folder in memory, where fsync takes no time; None if the system has none."""
     return "/dev/shm" if os.access("/dev/shm", os.W_OK) else None

@@ -1,4 +1,4 @@
-"""What a result file holds, bit by bit, and what lies beside it."""
+"""Contents of a result file, bit by bit, and the files next to it."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ import numpy as np
 __all__ = ["Contents", "contents", "differing", "holds", "litter", "reads", "start_of"]
 
 VOLATILE = ("wall_time", "real_time_factor", "peak_memory", "workers", "platform")
-"""Attributes, by their beginning, that tell how a result was computed and not what."""
+"""Beginnings of the names of attributes that describe the computation, not the result."""
 
 PATIENCE = 3
-"""After which a file counts as one that cannot be read [s]; it takes some 50 ms."""
+"""Time after which a file counts as unreadable [s]; reading takes about 50 ms."""
 
 Contents = dict[str, tuple[tuple[int, ...], bytes]]
 """Shape and bytes of every dataset and attribute, by path."""
 
 
 def contents(path: Path) -> Contents:
-    """All of a file but what tells how it was computed.
+    """Contents of a file, without the attributes that describe the computation.
 
     Args:
         path: The file.
@@ -48,13 +48,13 @@ def contents(path: Path) -> Contents:
 
 
 def reads(path: Path, right: Callable[[Contents], bool]) -> bool:
-    """Whether plain h5py reads a file that may be torn, and rightly.
+    """Whether plain h5py reads a file that may be torn, and its contents are right.
 
-    In a copy of this process: HDF5 may turn in a circle for ever in tables of which one half is older.
+    It reads in a copy of this process, since HDF5 may loop endlessly in tables of which one half is older.
 
     Args:
         path: The file.
-        right: Whether the contents are.
+        right: Whether contents are right.
     """
     pid = os.fork()
     if pid:
@@ -70,12 +70,12 @@ def reads(path: Path, right: Callable[[Contents], bool]) -> bool:
 
 
 def differing(a: Contents, b: Contents) -> list[str]:
-    """Paths of what is not the same, bit by bit."""
+    """Paths whose contents differ in any bit."""
     return sorted(name for name in {*a, *b} if a.get(name) != b.get(name))
 
 
 def start_of(part: Contents, whole: Contents) -> list[str]:
-    """Datasets of an unfinished file that are not the beginning of those of the whole one."""
+    """Datasets of an unfinished file that are not the beginning of those of the complete one."""
     bad = []
     for name, (shape, data) in part.items():
         if "@" in name:
@@ -87,11 +87,11 @@ def start_of(part: Contents, whole: Contents) -> list[str]:
 
 
 def holds(part: Contents, rows: Mapping[str, Mapping[str, int]]) -> bool:
-    """Whether a file holds at least so many rows.
+    """Whether a file holds at least the given rows.
 
     Args:
         part: The file.
-        rows: By train and group, as a run has noted them with its last commit.
+        rows: Numbers of rows by train and group, logged by the run at its last commit.
     """
     for train, groups in rows.items():
         for group, count in groups.items():
@@ -102,7 +102,7 @@ def holds(part: Contents, rows: Mapping[str, Mapping[str, int]]) -> bool:
 
 
 def litter(path: Path) -> list[str]:
-    """Files beside a finished result that belong to it."""
+    """Files next to a complete result that belong to it."""
     return sorted(each.name for each in path.parent.iterdir() if path.name in each.name and each != path)
 
 

@@ -1,4 +1,4 @@
-"""Signals, other programs at the same file, a clock that jumps, workers that die twice."""
+"""Signals, other programs on the same file, a clock that jumps, workers that die twice."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def batch_disturbances(yard: Yard) -> list[Check]:
 
 
 def _signalled(yard: Yard, number: signal.Signals, times: int, send: Callable[[Process, int], None]) -> Check:
-    """A signal, once or twice, and resume."""
+    """Send a signal, once or twice, and resume."""
     folder = yard.place()
     process = yard.start(folder)
     yard.wait_for_samples(process, folder)
@@ -46,7 +46,7 @@ def _signalled(yard: Yard, number: signal.Signals, times: int, send: Callable[[P
     words = f"{number.name} {'twice ' if times > 1 else ''}to {whom}, {yard.run.words}"
     status, said = process.wait(), process.said.strip()
     bad = [] if status == STATUS[number] else [f"exit status {status}, not {STATUS[number]}"]
-    if (times == 1 and not said.endswith(f"go on by: tiengine resume {NAME}")) or "Traceback" in said:
+    if (times == 1 and not said.endswith(f"resume with: tiengine resume {NAME}")) or "Traceback" in said:
         bad.append(f"said: {said[-300:]}")
     bad += [f"worker {each.pid} is left" for each in process.workers()] + yard.committed(folder, process)
     again = yard.go_on(folder)
@@ -56,7 +56,7 @@ def _signalled(yard: Yard, number: signal.Signals, times: int, send: Callable[[P
 
 
 def _paused(yard: Yard) -> Check:
-    """SIGSTOP for two seconds, SIGCONT."""
+    """Send SIGSTOP and, two seconds later, SIGCONT."""
     folder = yard.place()
     process = yard.start(folder)
     yard.wait_for_samples(process, folder)
@@ -68,7 +68,7 @@ def _paused(yard: Yard) -> Check:
 
 
 def _two_runs(yard: Yard) -> Check:
-    """Another run at the same file, with and without --force: refused, the first is not disturbed."""
+    """Start another run on the same file, with and without --force: refused, the first is not disturbed."""
     folder, bad = yard.place(), []
     process = yard.start(folder)
     yard.wait_for_samples(process, folder)
@@ -84,7 +84,7 @@ def _two_runs(yard: Yard) -> Check:
 
 
 def _two_resumes(yard: Yard) -> Check:
-    """Two that go on with the same file at once: one is refused."""
+    """Resume the same file twice at once: one is refused."""
     folder, bad = yard.place(), []
     process = yard.start(folder)
     yard.wait_for_samples(process, folder)
@@ -97,11 +97,11 @@ def _two_resumes(yard: Yard) -> Check:
     if second.wait() != 2 or "another run is writing it" not in second.said:
         bad.append(f"second resume: exit status {second.status}: {second.said}")
     first.wait()
-    return _ended("two that resume the same file at once", bad + yard.wrong(folder, first))
+    return _ended("two processes that resume the same file at once", bad + yard.wrong(folder, first))
 
 
 def _read_meanwhile(yard: Yard) -> Check:
-    """Read the file all the time, by h5py and by tiengine.open, while it is written."""
+    """Read the file continuously, by h5py and by tiengine.open, while it is written."""
     folder, bad = yard.place(), []
     process = yard.start(folder)
     yard.wait_for_file(process, folder)
@@ -122,7 +122,7 @@ def _read_meanwhile(yard: Yard) -> Check:
 
 
 def _clock_jumps(yard: Yard) -> Check:
-    """The clock of the day jumps by hours at every look at it."""
+    """Let the clock jump by hours at every reading."""
     folder = yard.place()
     real, jumps = time.time, [0]
 
@@ -140,7 +140,7 @@ def _clock_jumps(yard: Yard) -> Check:
 
 
 def _worker_killed_twice(yard: Yard) -> Check:
-    """Both workers of a task: its trains are marked, the others complete, exit status 1."""
+    """Kill both workers of a task: its trains are marked, the others complete, exit status 1."""
     folder, bad = yard.place(), []
     process = yard.start(folder)
     victims: list[int] = []
@@ -151,7 +151,7 @@ def _worker_killed_twice(yard: Yard) -> Check:
     while len(victims) < 2 and process.poll() is None:
         new = [each.pid for each in process.workers() if each.pid not in known]
         if new:
-            time.sleep(1.0)  # it has taken the task by then
+            time.sleep(1.0)  # the second worker has the task by then
             os.kill(new[0], signal.SIGKILL)
             victims.append(new[0])
         time.sleep(0.002)
@@ -167,7 +167,7 @@ def _worker_killed_twice(yard: Yard) -> Check:
     others = sorted(name for name in whole if not _of(name, failed))
     bad += [f"not complete: {name}" for name in others if found.get(name) != yard.reference[name]][:5]
     bad += [f"left: {each.name}" for each in folder.iterdir() if each.name != NAME]
-    words = "a worker killed, then the one that went on with its trains: they are marked, the others complete"
+    words = "a worker killed, then the one that continued its trains: they are marked, the others complete"
     return {"words": words, "good": not bad, "status": status, "said": said, "wrong": bad}
 
 
@@ -180,7 +180,7 @@ def _ended(words: str, bad: list[str]) -> Check:
 
 
 def clock_readers(package: Path) -> list[str]:
-    """Places in the source that look at the clock of the day.
+    """Places in the source that read the time of day.
 
     Args:
         package: Folder of the source.

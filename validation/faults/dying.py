@@ -1,4 +1,4 @@
-"""Death of a copy of this process right before one of its system calls that change files."""
+"""Death of a copy of this process right before a system call that changes files."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ DIED = 99
 
 
 class Call(NamedTuple):
-    """A system call that is about to change something.
+    """A system call that is about to change a file or folder.
 
     Attributes:
         kind: "open", "write", "truncate", "fsync", "rename" or "unlink".
-        path: Of what; the folder's for its names.
+        path: Path of the file, or of the folder for changes of names.
         target: New name of a renamed file.
-        offset: Of the bytes, or the new size.
+        offset: Position of the bytes, or the new size.
         data: Bytes to write.
-        fresh: Whether opening makes or empties the file.
+        fresh: Whether opening creates or empties the file.
     """
 
     kind: str
@@ -36,12 +36,12 @@ class Call(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Kind and name."""
+        """Kind of the call and name of the file."""
         return f"{self.kind} {(self.target or self.path).name}"
 
 
 def at_call(n: int) -> Callable[[Call], bool]:
-    """Whether a call is the n-th, from 0."""
+    """Predicate that is true for the n-th call, from 0."""
     left = [n]
 
     def due(call: Call) -> bool:
@@ -52,12 +52,12 @@ def at_call(n: int) -> Callable[[Call], bool]:
 
 
 def in_copy(session: Callable[[], object], due: Callable[[Call], bool], torn: bool = False) -> int:
-    """Do something in a copy of this process that dies right before a call.
+    """Run a function in a copy of this process that dies right before a call.
 
     Args:
-        session: What to do.
+        session: Function to run.
         due: Whether to die before a call.
-        torn: Carry out half of it first, if it is a write.
+        torn: Perform the first half of the call, if it is a write.
 
     Returns:
         Exit status, ``DIED`` after death.
@@ -91,10 +91,10 @@ Before = Callable[[Call, Callable[[], object]], None]
 
 @contextmanager
 def watched(before: Before) -> Iterator[None]:
-    """Have something called before every call that changes files.
+    """Call a function before every call that changes files.
 
     Args:
-        before: Takes the call, and what carries out half of it if it is a write.
+        before: Function of the call and of an action that performs half of it if it is a write.
     """
     plain_open, replace, unlink, fsync = pathlib.Path.open, pathlib.Path.replace, pathlib.Path.unlink, os.fsync
 
@@ -127,11 +127,11 @@ def watched(before: Before) -> Iterator[None]:
 
 
 def _nothing() -> None:
-    """Half of what has no halves."""
+    """Do nothing: the call has no halves."""
 
 
 class _Watched:
-    """A file whose writes go straight to the system."""
+    """A file whose writes go directly to the system."""
 
     def __init__(self, file: Any, path: Path, before: Before) -> None:
         self._file, self._path, self._before = file, path, before

@@ -1,4 +1,4 @@
-"""kill -9 at random instants: what is left, and whether it can be gone on with to the same bits."""
+"""kill -9 at random instants: remaining files, and whether the resumed run ends with the same bits."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from validation.faults.record import Record, read
 __all__ = ["Outcome", "Yard"]
 
 NAME = "run.h5"
-PATIENCE = 15.0  # s for workers of a dead parent to leave: they notice at the end of their chunk
-TRIES = 4  # of a kill that came too late
+PATIENCE = 15.0  # s within which workers of a dead parent end: they notice at the end of their chunk
+TRIES = 4  # repeats of a kill that came too late
 
 Launch = Callable[[Path, str, Sequence[str]], Process]
 LAUNCH: dict[str, Launch] = {"copy": copied, "command": command}
@@ -32,20 +32,20 @@ LAUNCH: dict[str, Launch] = {"copy": copied, "command": command}
 
 @dataclass
 class Outcome:
-    """What became of a killed run.
+    """Findings of a killed run.
 
     Attributes:
-        kill: What was done to it.
-        at: Instant, after its start [s].
-        phase: What it was at: "before", "set-up", "loop", "commit" (its journal lay there).
-        opens: Whether plain h5py opened the file as it was left.
-        mended: Whether it did not, and did with the journal.
-        kept: Whether all that was committed is there, bit by bit.
-        lost_samples, lost_bytes: Written since the last commit, of wheels and in all.
-        resumed: How often it was gone on with.
+        kill: The kill.
+        at: Instant after the start [s].
+        phase: Phase of the run: "before", "set-up", "loop", "commit" (a journal existed).
+        opens: Whether plain h5py opened the remaining file.
+        mended: Whether the file opened only after the journal was applied.
+        kept: Whether everything committed is in the file, bit by bit.
+        lost_samples, lost_bytes: Data written since the last commit, of wheels and in all.
+        resumed: How often the run was resumed.
         status: Last exit status.
-        same: Whether it has the bits of the undisturbed run in the end.
-        wrong: What is not as it should be.
+        same: Whether the final file has the bits of the undisturbed run.
+        wrong: Errors found.
     """
 
     kill: Kill
@@ -63,29 +63,29 @@ class Outcome:
 
     @property
     def survived(self) -> bool:
-        """Whether nothing is wrong."""
+        """Whether no error was found."""
         return self.same and self.kept and (self.opens or self.mended) and not self.wrong
 
 
 class Yard:
-    """A place where one run is started, disturbed and compared, again and again.
+    """A place where one run is repeatedly started, disturbed and compared.
 
     Attributes:
-        folder: Holds the folders of its runs.
-        run: What is run.
-        reference: What an undisturbed run leaves.
-        instants: When such a run has its file, its first samples, and its end [s], by how it is started.
+        folder: Parent of the folders of its runs.
+        run: Run to disturb.
+        reference: Contents of the file of an undisturbed run.
+        instants: Times of the file, of the first samples and of the end of such a run [s], by kind of start.
     """
 
     def __init__(self, folder: Path, run: Run) -> None:
-        """Run undisturbed in this process, which compiles."""
+        """Run undisturbed in this process, which compiles the kernels."""
         self.folder, self.run = folder, run
         self._count = 0
         self.reference: Contents = self._undisturbed()
         self.instants: dict[str, tuple[float, float, float]] = {}
 
     def _undisturbed(self) -> Contents:
-        """In this process: kernels stay compiled."""
+        """Run in this process, in which kernels remain compiled."""
         from tiengine.scenario.scenario import load_scenario
         from tiengine.simulation import simulate
 
@@ -98,7 +98,7 @@ class Yard:
         return contents(path)
 
     def place(self) -> Path:
-        """An empty folder."""
+        """Make an empty folder."""
         self._count += 1
         folder = self.folder / f"{self._count:04d}"
         folder.mkdir()
@@ -109,15 +109,15 @@ class Yard:
         return LAUNCH[how](folder, "run", [*self.run.arguments, "-o", NAME, *extra])
 
     def resume(self, folder: Path, how: str = "copy") -> Process:
-        """Start going on with it."""
+        """Start to resume it."""
         return LAUNCH[how](folder, "resume", ["resume", NAME, *self.run.effort])
 
     def go_on(self, folder: Path, how: str = "copy") -> Process:
-        """Resume, or begin again where there is no file (yet)."""
+        """Resume, or start again if there is no file yet."""
         return self.resume(folder, how) if (folder / NAME).exists() else self.start(folder, how)
 
     def clear(self, folder: Path) -> None:
-        """Forget a folder and its logs."""
+        """Remove a folder and its logs."""
         shutil.rmtree(folder)
         for beside in self.folder.glob(f"{folder.name}.*"):
             beside.unlink()
@@ -133,12 +133,12 @@ class Yard:
             self.instants[how] = (seen[0], seen[1], time.perf_counter() - clock)
             bad = self.wrong(folder, process)
             if bad:
-                raise RuntimeError(f"an undisturbed run is not like the other: {bad}; {process.said}")
+                raise RuntimeError(f"two undisturbed runs differ: {bad}; {process.said}")
             self.clear(folder)
         return self.instants[how]
 
     def perform(self, kill: Kill) -> Outcome:
-        """Kill, look, resume, compare."""
+        """Kill, inspect, resume, compare."""
         self.measure(kill.start)
         for attempt in range(TRIES):
             folder = self.place()
@@ -148,7 +148,7 @@ class Yard:
                 break
             self.clear(folder)
         else:
-            outcome.wrong.append("never alive when it was to be killed")
+            outcome.wrong.append("ended before every kill")
             return outcome
         try:
             self._after(process, kill, folder, outcome)
@@ -159,23 +159,23 @@ class Yard:
         return outcome
 
     def wait_for_file(self, process: Process, folder: Path) -> None:
-        """Until a run has made its file."""
+        """Wait until a run has created its file."""
         self._until(process, _exists, folder)
 
     def wait_for_samples(self, process: Process, folder: Path) -> None:
-        """Until a run has written samples."""
+        """Wait until a run has written samples."""
         self._until(process, _loops, folder)
 
     def committed(self, folder: Path, process: Process) -> list[str]:
-        """What is wrong with an unfinished file."""
+        """Errors of an unfinished file."""
         outcome = Outcome(Kill("", "", "", "", 0.0, 0.0))
         self._look(process, folder, outcome)
         return outcome.wrong
 
     def wrong(self, folder: Path, process: Process) -> list[str]:
-        """What is not as an undisturbed run leaves it, after exit status 0."""
+        """Differences from an undisturbed run, after exit status 0."""
         if process.status == 2 and _said_complete(process):
-            pass  # it was killed on its way out, after its last commit
+            pass  # it was killed after its last commit, while ending
         elif process.status != 0:
             return [f"exit status {process.status}: {process.said[-300:]}"]
         bad = differing(contents(folder / NAME), self.reference)
@@ -208,7 +208,7 @@ class Yard:
         return self.go_on(folder, how)
 
     def _kill(self, process: Process, moment: str, part: float, kill: Kill, folder: Path, outcome: Outcome) -> bool:
-        """Kill at a moment; whether it was still alive."""
+        """Kill at a moment; return whether it was still alive."""
         clock = time.perf_counter()
         exists, loops, ends = self.measure(kill.start)
         if moment == "before":
@@ -238,14 +238,14 @@ class Yard:
         return process.status == -signal.SIGKILL
 
     def _until(self, process: Process, sign: Callable[[Process, Path], bool], folder: Path) -> float:
-        """Wait for a sign, or the end; the time."""
+        """Wait for a sign or the end; return the time."""
         while process.poll() is None and not sign(process, folder):
             if sign is not _commits:
                 time.sleep(0.003)
         return time.perf_counter()
 
     def _look(self, process: Process, folder: Path, outcome: Outcome) -> None:
-        """What the killed process has left."""
+        """Inspect the files of the killed process."""
         path, noted = folder / NAME, read(process.log)
         if not path.exists():
             if noted.commits:
@@ -262,7 +262,7 @@ class Yard:
         outcome.kept = _kept(left, noted, self.reference, outcome)
 
     def _mended(self, path: Path, outcome: Outcome) -> Contents:
-        """The file once its journal was carried out."""
+        """Open the file after its journal was applied."""
         had = journal_of(path).exists()
         try:
             results.open(path).close()
@@ -286,7 +286,7 @@ def _kept(left: Contents, noted: Record, reference: Contents, outcome: Outcome) 
 
 def _said_complete(process: Process) -> bool:
     """Whether there was nothing to resume any more."""
-    return process.said.strip() == f"error: {NAME}: is complete; there is nothing to resume"
+    return process.said.strip() == f"error: {NAME}: the run is complete; there is nothing to resume"
 
 
 def _exists(process: Process, folder: Path) -> bool:

@@ -1,9 +1,9 @@
 """Runs as processes that can be killed: the command itself, or a copy of this process with its kernels compiled.
 
-The command takes some 10 s to begin, nearly all of it importing and compiling. A copy (fork) of a process that has run
-the scenario before begins at once, does the same and writes the same bits, so that most of its life is spent where
-files are written. Taichi's threads do not live on in a copy; with one thread only its setting-up needs them, and these
-results are kept.
+The command takes about 10 s to start, nearly all of it for importing and compiling. A copy (fork) of a process that
+has run the scenario before starts at once, does the same and writes the same bits, so that most of its life is spent
+where files are written. Taichi's threads do not survive in a copy; with one thread only the plates' shape functions
+need them, whose results are kept.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass
 class Process:
-    """A process that was started.
+    """A started process.
 
     Attributes:
-        pid: Its number.
-        log: What it notes (:mod:`validation.faults.record`).
-        words: What it says on stderr.
+        pid: Process id.
+        log: Its log (:mod:`validation.faults.record`).
+        words: File of its stderr.
         status: Exit status, negative for a signal; None while it runs.
     """
 
@@ -44,7 +44,7 @@ class Process:
     status: int | None = None
 
     def poll(self) -> int | None:
-        """Exit status, or None."""
+        """Exit status; None while it runs."""
         if self.status is None:
             pid, status = os.waitpid(self.pid, os.WNOHANG)
             if pid:
@@ -52,7 +52,7 @@ class Process:
         return self.status
 
     def wait(self, seconds: float = 120.0) -> int:
-        """Exit status; a process that does not end in time is killed, and counts as such."""
+        """Wait for the exit status; a process that does not end in time is killed and counts as killed."""
         deadline = time.monotonic() + seconds
         while self.poll() is None:
             if time.monotonic() > deadline:
@@ -61,22 +61,22 @@ class Process:
         return int(self.status or 0)
 
     def signal(self, number: int) -> None:
-        """Send a signal if it still runs."""
+        """Send a signal if the process still runs."""
         if self.poll() is None:
             os.kill(self.pid, number)
 
     def signal_group(self, number: int) -> None:
-        """Send a signal to it and all processes below it."""
+        """Send a signal to the process and all its descendants."""
         if self.poll() is None:
             os.killpg(self.pid, number)
 
     def kill(self) -> int:
-        """Kill -9; the exit status."""
+        """Send SIGKILL and return the exit status."""
         self.signal(signal.SIGKILL)
         return self.wait()
 
     def workers(self) -> list[psutil.Process]:
-        """Processes below it that compute."""
+        """Descendants that compute."""
         with suppress(psutil.NoSuchProcess):
             below = psutil.Process(self.pid).children(recursive=True)
             return [each for each in below if "resource_tracker" not in _command_of(each)]
@@ -84,7 +84,7 @@ class Process:
 
     @property
     def said(self) -> str:
-        """What it has said on stderr."""
+        """Text that it wrote to stderr."""
         return self.words.read_text(errors="replace") if self.words.exists() else ""
 
 
@@ -92,8 +92,8 @@ def command(folder: Path, name: str, words: Sequence[str]) -> Process:
     """Start ``tiengine WORDS...``.
 
     Args:
-        folder: Where it works.
-        name: For its log, which lies beside the folder.
+        folder: Working folder.
+        name: Name of its log, which is next to the folder.
         words: Arguments.
     """
     log, said = _beside(folder, name)
@@ -103,16 +103,16 @@ def command(folder: Path, name: str, words: Sequence[str]) -> Process:
         started = subprocess.Popen(
             call, cwd=folder, env=os.environ | search, stdout=file, stderr=file, start_new_session=True
         )
-    started.returncode = 0  # this class waits for it
+    started.returncode = 0  # this class waits for the process
     return Process(started.pid, log, said)
 
 
 def copied(folder: Path, name: str, words: Sequence[str]) -> Process:
-    """Start the same as a copy of this process, which must have run the scenario before.
+    """Start ``tiengine WORDS...`` as a copy of this process, which must have run the scenario before.
 
     Args:
-        folder: Where it works.
-        name: For its log.
+        folder: Working folder.
+        name: Name of its log.
         words: Arguments.
     """
     log, said = _beside(folder, name)
@@ -129,7 +129,7 @@ def copied(folder: Path, name: str, words: Sequence[str]) -> Process:
 
 
 def keep_shapes() -> None:
-    """Compute shapes of plates once and keep them, for copies."""
+    """Compute the shape functions of plates once and keep them for copies."""
     from tiengine.kernels import plate
 
     compute: Callable[..., Any] = plate.tabulate_shapes
@@ -146,7 +146,7 @@ def keep_shapes() -> None:
 
 
 def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str]) -> int:
-    """Be the command, in a copy."""
+    """Run the command in a copy."""
     import logging
 
     import click
@@ -162,7 +162,7 @@ def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str]) -> in
     os.dup2(file, 2)
     logging.disable()
     recorded(log)
-    worker.multiprocessing = _Copies()  # type: ignore[attr-defined]
+    worker.multiprocessing = _Copies()  # type: ignore[assignment,attr-defined]
     try:
         main(list(words), prog_name="tiengine", standalone_mode=True)
     except SystemExit as end:
@@ -180,7 +180,7 @@ def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str]) -> in
 
 
 class _Copies:
-    """Stands in for ``multiprocessing`` in :mod:`tiengine.simulation.worker`: workers own nothing but a pipe."""
+    """Substitute for ``multiprocessing`` in :mod:`tiengine.simulation.worker`: workers own only a pipe."""
 
     def __init__(self) -> None:
         self._fork = multiprocessing.get_context("fork")
@@ -199,7 +199,7 @@ class _Copies:
 
 
 def _alone(target: Callable[..., None], args: tuple[Any, ...]) -> None:
-    """Close what a spawned process would not have: locks and pipes of others above all."""
+    """Close files that a spawned process would not have, in particular locks and pipes of others."""
     parent = multiprocessing.parent_process()
     kept = {0, 1, 2, args[0].fileno(), getattr(parent, "sentinel", None)}
     for number in [int(name) for name in os.listdir("/proc/self/fd")]:

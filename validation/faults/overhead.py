@@ -1,8 +1,8 @@
-"""What checkpoints and commits cost, as a share of the loop.
+"""Cost of checkpoints and commits, as a share of the loop.
 
-Counted: the time of one checkpoint (state, commit, file) every 60 s and of one commit every 5 s (more rarely if it
-took more than 1 % of that), each with what is written in the meantime. Directly: blocks of steps with a commit and a
-checkpoint after each, and without, in turn; the difference, which holds what they do to caches as well, at the rates of
+Counted: the time of one checkpoint (state, commit, file) every 60 s and of one commit every 5 s (less often if it
+took more than 1 % of that), each with the data written in the meantime. Directly: blocks of steps with and without a
+commit and a checkpoint after each, in turn; their difference, which includes the effect on caches, at the rates of
 a real run.
 """
 
@@ -33,13 +33,13 @@ class Overhead:
     """Costs of a run with default outputs.
 
     Attributes:
-        trains: Advanced together.
-        chunk: Wall time of a thousand steps, with writing [s].
-        commit: Of a commit after as many chunks as 5 s hold [s].
-        checkpoint: Of a checkpoint, commit included [s].
-        counted: Share of the loop.
-        difference: Of a block with a checkpoint to one without [s].
-        direct: Share of the loop.
+        trains: Number of trains advanced together.
+        chunk: Wall time of a thousand steps, including writing [s].
+        commit: Wall time of a commit after the chunks of 5 s [s].
+        checkpoint: Wall time of a checkpoint, including its commit [s].
+        counted: Share of the loop, counted.
+        difference: Difference between blocks with and without a checkpoint [s].
+        direct: Share of the loop, measured directly.
     """
 
     trains: int
@@ -52,12 +52,12 @@ class Overhead:
 
 
 def overhead(folder: Path, trains: int, repeats: int) -> Overhead:
-    """Measure.
+    """Measure the costs.
 
     Args:
-        folder: For the result.
-        trains: Advanced together.
-        repeats: Of each.
+        folder: Folder of the result.
+        trains: Number of trains advanced together.
+        repeats: Number of repeats of each.
     """
     settings = ["train.distance=100000", f"ensemble.size={trains}"]
     scenario = load_scenario("paper", settings)
@@ -66,7 +66,7 @@ def overhead(folder: Path, trains: int, repeats: int) -> Overhead:
         (task,) = plan(scenario)
         run = Run.begin(task)
         collector = Collector(scenario, writer, path)
-        collector.take(Begun(0, run.labels, facts_at_start(task, run.stepper.ingredients)))
+        collector.take(Begun(0, run.labels, facts_at_start(task, run.stepper.ingredients, run.tracks)))
         measure = _Measure(run, collector, writer)
         measure.block(3)
         plain, with_one = [], []
@@ -99,7 +99,7 @@ class _Measure:
         self._blocks = run.blocks()
 
     def block(self, chunks: int) -> float:
-        """Advance and write; no commit."""
+        """Advance and write without a commit."""
         clock = time.perf_counter()
         for _ in range(chunks):
             self._collector._committed = clock + 1e9  # none of its own
@@ -107,20 +107,20 @@ class _Measure:
         return time.perf_counter() - clock
 
     def checkpoint(self) -> float:
-        """As a run does every 60 s."""
+        """Write a checkpoint, as a run does every 60 s."""
         clock = time.perf_counter()
         saved = save(self._run, 0.0)
         self._collector.take(Saved(self._run.task.trains, saved))
         return time.perf_counter() - clock
 
     def commit_after(self, chunks: int) -> float:
-        """Of what has been written in some chunks."""
+        """Time of a commit after some chunks."""
         self.block(chunks)
         clock = time.perf_counter()
         self._writer.commit()
         return time.perf_counter() - clock
 
     def checkpoint_after(self, chunks: int) -> float:
-        """Likewise, with a checkpoint."""
+        """Time of a checkpoint after some chunks."""
         self.block(chunks)
         return self.checkpoint()

@@ -1,4 +1,4 @@
-"""The report: a table on the screen, and ``faults.md``."""
+"""Report: a table on the screen, and ``faults.md``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rich.table import Table
 __all__ = ["page", "rows", "show"]
 
 TARGET = 0.02  # of the loop, for checkpoints
-HEAD = ("part", "what was done", "what came of it", "")
+HEAD = ("part", "what was done", "result", "")
 VERDICTS = {True: "good", False: "BAD", None: "skipped"}
 COLOURS = {True: "green", False: "bold red", None: "yellow"}
 
@@ -21,7 +21,7 @@ Found = Mapping[str, Any]
 
 
 def rows(known: Mapping[str, Found]) -> list[Row]:
-    """One row for each thing that was tried.
+    """Rows of the table, one per experiment.
 
     Args:
         known: Findings by part.
@@ -41,7 +41,7 @@ def rows(known: Mapping[str, Found]) -> list[Row]:
 
 
 def show(table_rows: Sequence[Row], console: Console) -> None:
-    """Print the rows."""
+    """Print the table."""
     table = Table(show_lines=True)
     for name in HEAD:
         table.add_column(name, overflow="fold")
@@ -54,7 +54,7 @@ def page(known: Mapping[str, Found]) -> str:
     """Markdown.
 
     Args:
-        known: Findings by part, with their circumstances.
+        known: Findings by part, with date, machine and load.
     """
     found = rows(known)
     judged = [row for row in found if row[3] is not None]
@@ -62,7 +62,7 @@ def page(known: Mapping[str, Found]) -> str:
         "# Faults",
         "",
         f"{sum(bool(row[3]) for row in judged)} of {len(judged)} good. Written by `python -m validation.faults`;",
-        "`docs/robustness.md` says what is promised.",
+        "`docs/robustness.md` states the guarantees.",
         "",
         *_summary(known),
         *_circumstances(known),
@@ -75,9 +75,9 @@ def page(known: Mapping[str, Found]) -> str:
     if "deaths" in known.get("power", {}):
         lines += ["", "## Power cuts", "", *_power_words(known["power"])]
     if "overhead" in known.get("overhead", {}):
-        lines += ["", "## What checkpoints cost", "", *_overhead(known["overhead"]["overhead"])]
+        lines += ["", "## Cost of checkpoints", "", *_overhead(known["overhead"]["overhead"])]
     rest = [row for row in found if "checks" in known[row[0]]]
-    lines += ["", "## Everything else", ""]
+    lines += ["", "## Other faults", ""]
     lines += _table(HEAD, [(part, words, said, VERDICTS[good]) for part, words, said, good in rest])
     return "\n".join(lines) + "\n"
 
@@ -94,14 +94,14 @@ def _kills(name: str, part: Found) -> Iterator[Row]:
 
 DEATHS = {
     "boundaries": "death at every system call that changes the disk",
-    "power": "power cut at every second of these calls, made up",
+    "power": "power cut at every second of these calls, constructed",
 }
 
 
 def _boundaries(name: str, part: Found) -> Row:
     said = (
-        f"{part['deaths']} deaths: {part['as_before']} times as of the last commit, {part['as_after']} of the one under"
-        f" way; {len(part['wrong'])} times anything else"
+        f"{part['deaths']} deaths: {part['as_before']} times as of the last commit, {part['as_after']} of the one in"
+        f" progress; {len(part['wrong'])} times another state"
     )
     return name, DEATHS[name], said, not part["wrong"]
 
@@ -120,32 +120,32 @@ def _checks(name: str, checks: Sequence[Found]) -> Iterator[Row]:
 
 
 def _summary(known: Mapping[str, Found]) -> Iterator[str]:
-    """All kills in a sentence, and how well trains that ran away were named."""
+    """Sentences about all kills, and about the messages of diverging trains."""
     killed = [part["summary"] for part in known.values() if "summary" in part]
     if killed:
         survived, kills, kept = (sum(each[name] for each in killed) for name in ("survived", "kills", "kept"))
         largest = max(each["lost_bytes_largest"] for each in killed)
         yield f"**kill -9: {survived} of {kills} ended with the same bits, {kills - kept} lost a committed sample.**"
         yield f"At most {largest / 1e6:.1f} MB had been written since the last commit: these runs commit every thousand"
-        yield "steps; a run with default settings every 5 s. Nothing of it is missing in the end."
+        yield "steps; a run with default settings every 5 s. After the resume nothing is missing."
     spoilt = [each for each in known.get("physics", {}).get("checks", []) if "late" in each]
     if spoilt:
         named = sum(each["named"] for each in spoilt)
-        yield f"Of {len(spoilt)} trains whose numbers were spoilt, each was stopped after"
-        yield f"{max(each['late'] for each in spoilt) * 1e3:.1f} ms at most; {named} times the sentence names the part"
-        yield "that was spoilt, else another part of the train, over which it had spread by then."
+        yield f"Of {len(spoilt)} trains whose state was corrupted, each was stopped after"
+        yield f"{max(each['late'] for each in spoilt) * 1e3:.1f} ms at most; {named} times the message names the part"
+        yield "that was corrupted, otherwise another part, to which it had spread by then."
     yield ""
 
 
 def _circumstances(known: Mapping[str, Found]) -> list[str]:
-    """Machine and date of each part."""
+    """Table of machine and date of each part."""
     seen = {name: part["circumstances"] for name, part in known.items()}
     lines = list({_machine(each): None for each in seen.values()})
     body = [
         (name, each["date"], each["effort"], each["commit"], f"{each['load_average']:.1f}", f"{part['seconds']:.0f}")
         for (name, each), part in zip(seen.items(), known.values(), strict=True)
     ]
-    return [*lines, "", *_table(("part", "begun", "effort", "commit", "load average then", "seconds"), body)]
+    return [*lines, "", *_table(("part", "begun", "effort", "commit", "load average", "seconds"), body)]
 
 
 def _machine(seen: Found) -> str:
@@ -155,13 +155,13 @@ def _machine(seen: Found) -> str:
 
 
 def _kill_tables(part: Found) -> list[str]:
-    """Counts over how and when; then those that went wrong."""
+    """Counts by kind of kill and phase, then the kills that went wrong."""
     groups: dict[tuple[str, ...], list[Found]] = {}
     for row in part["kills"]:
         kill = row["kill"]
         again = ", and in the resume" if kill["again"] else ""
         groups.setdefault((kill["victim"], f"{kill['moment']}{again}", kill["start"]), []).append(row)
-    head = ("victim", "when", "started as", "kills", "survived", "killed in", "opened as left", "by the journal",
+    head = ("victim", "when", "started as", "kills", "survived", "killed in", "opened", "opened by the journal",
             "second kills", "since last commit, largest")  # fmt: skip
     body = []
     for key, group in groups.items():
@@ -182,21 +182,21 @@ def _boundary_words(part: Found) -> list[str]:
     return [
         f"System calls of each session: {sessions}. A copy of the process died before each of them, and in the",
         f"middle of each write: {part['deaths']} times. The file was as of the last commit {part['as_before']} times,",
-        f"as of the one under way {part['as_after']} times; {part['by_journal']} of these only once the journal was",
-        "carried out by whatever opened the file next, which was broken off at every call as well,",
+        f"as of the one in progress {part['as_after']} times; {part['by_journal']} of these only after the journal was",
+        "applied by the program that opened the file next, which was interrupted before every call as well,",
         f"{part['twice']} times.",
-        f"Anything else: {len(part['wrong'])}.",
+        f"Other states: {len(part['wrong'])}.",
         *(f"- {_one_line(each)}" for each in part["wrong"][:20]),
     ]
 
 
 def _power_words(part: Found) -> list[str]:
     return [
-        f"{part['deaths']} disks were made up as a journalling file system may leave them when power fails during the",
-        "same sessions: of each file what was there at its last fsync and any part of what was written since, in any",
-        f"order. The file was as of the last commit {part['as_before']} times, as of the one under way",
+        f"{part['deaths']} disks were constructed as a journalling file system may leave them when power fails in the",
+        "same sessions: of each file the content at its last fsync and any part of later writes, in any",
+        f"order. The file was as of the last commit {part['as_before']} times, as of the one in progress",
         f"{part['as_after']} times, {part['by_journal']} of these with its journal.",
-        f"Anything else: {len(part['wrong'])}.",
+        f"Other states: {len(part['wrong'])}.",
         *(f"- {_one_line(each)}" for each in part["wrong"][:20]),
     ]
 
@@ -204,7 +204,7 @@ def _power_words(part: Found) -> list[str]:
 def _overhead(found: Sequence[Found]) -> list[str]:
     head = (
         *("trains", "1000 steps", "commit of 5 s of samples", "checkpoint with commit", "share, counted"),
-        *("more in a block with a checkpoint", "share, directly"),
+        *("additional time of a block with a checkpoint", "share, directly"),
     )
     body = [
         (str(each["trains"]), f"{each['chunk'] * 1e3:.0f} ms", f"{each['commit'] * 1e3:.1f} ms",

@@ -1,4 +1,4 @@
-"""Physics that goes wrong in one train of four: caught within a millisecond, named, and no matter to the others."""
+"""Diverging physics in one train of four: detected within a millisecond, named, without effect on the others."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from tiengine.engine import stability
 from tiengine.engine import time_step as prepare
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recording.guards import LIMITS
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulation import simulate
-from tiengine.simulation import time_loop as march
+from tiengine.simulation import simulate, time_loop
 from validation.faults.contents import Contents, contents
 from validation.faults.plan import SEED
 from validation.faults.space import Check
@@ -31,18 +31,18 @@ BLOCKS = {
     "lateral": ("rail, laterally",),
     "slabs": ("slab",),
 }
-"""Parts of the state, and what the sentence must name."""
+"""Parts of the state, with the words that the message must contain."""
 
 SETTINGS = ["train.distance=40", f"ensemble.size={TRAINS}", 'output.precision="double"']
 Change = Callable[[Any, int], None]
 
 
 def physics(folder: Path, repeats: int) -> list[Check]:
-    """Not a number, and growth, at random steps in every part of the state.
+    """Insert NaN or growth at random steps in every part of the state.
 
     Args:
-        folder: For results.
-        repeats: Of each.
+        folder: Folder of the results.
+        repeats: Number of repeats of each.
     """
     rng = np.random.default_rng(SEED)
     scenario = load_scenario("paper", SETTINGS)
@@ -61,7 +61,7 @@ def physics(folder: Path, repeats: int) -> list[Check]:
 def _disturbed(
     path: Path, scenario: Any, reference: Contents, kind: str, block: str, train: int, step: int, dt: float, rng: Any
 ) -> Check:
-    """Spoil one train's state from a step on."""
+    """Corrupt one train's state from a step on."""
     crossed: list[float] = []
     change = _nan(block, train, step, rng) if kind == "not a number" else _growth(block, train, step)
     with _spoiled(change, block, train, crossed, dt), simulate.run(scenario, path, workers=1, force=True) as result:
@@ -73,7 +73,7 @@ def _disturbed(
         late = float(events["time"][-1]) - crossed[0]
         bad += [] if -1e-9 <= late <= WITHIN + 1e-9 else [f"caught {late:g} s after it began"]
         named = any(word in str(events["message"][-1]) for word in BLOCKS[block])
-        if not named and late < 0.5 * dt:  # later, it has spread over the train through the wheels
+        if not named and late < 0.5 * dt:  # later it has spread over the train through the wheels
             bad.append(f"names another part: {events['message'][-1]}")
     found = contents(path)
     bad += [
@@ -86,7 +86,7 @@ def _disturbed(
 
 
 def _nan(block: str, train: int, step: int, rng: Any) -> Change:
-    """One coordinate, its rate or its acceleration is no number at the end of a step."""
+    """Set one coordinate, its rate or its acceleration to NaN at the end of a step."""
     row = int(rng.choice([at.U, at.V, at.A]))
 
     def change(state: Any, done: int) -> None:
@@ -98,7 +98,7 @@ def _nan(block: str, train: int, step: int, rng: Any) -> Change:
 
 
 def _growth(block: str, train: int, step: int) -> Change:
-    """A part's motion grows by a half in every step, as in an unstable scheme."""
+    """Let a part's motion grow by a half in every step, as in an unstable scheme."""
 
     def change(state: Any, done: int) -> None:
         if done >= step and np.isfinite(state.motion).all():
@@ -111,7 +111,7 @@ def _growth(block: str, train: int, step: int) -> Change:
 @contextmanager
 def _spoiled(change: Change, block: str, train: int, crossed: list[float], dt: float) -> Iterator[None]:
     """Runs whose steps end with a change of the state, before the guard looks; notes when a limit is passed."""
-    begin = march.Run.begin
+    begin = time_loop.Run.begin
 
     def spoiled(*arguments: Any, **options: Any) -> Any:
         run = begin(*arguments, **options)
@@ -128,18 +128,18 @@ def _spoiled(change: Change, block: str, train: int, crossed: list[float], dt: f
         stepper.watch("faults", spoil, before="guards")
         return run
 
-    march.Run.begin = staticmethod(spoiled)  # type: ignore[method-assign,assignment]
+    time_loop.Run.begin = staticmethod(spoiled)  # type: ignore[method-assign]
     try:
         yield
     finally:
-        march.Run.begin = begin  # type: ignore[method-assign]
+        time_loop.Run.begin = begin  # type: ignore[method-assign]
 
 
 def _unstable(path: Path, checked: bool) -> Check:
-    """A step that is far too long: refused at the start, and caught on the way if that check is taken out."""
+    """Use a step that is far too long: refused at the start, and detected during the run if that check is removed."""
     words = f"numerics.time_step = 0.001, five times too long{'' if checked else ', past the check at the start'}"
-    tolerated = prepare.TOLERATED_GROWTH
-    prepare.TOLERATED_GROWTH = tolerated if checked else math.inf
+    tolerated = stability.TOLERATED_GROWTH
+    vars(prepare)["TOLERATED_GROWTH"] = tolerated if checked else math.inf
     said, expected = "", (InputError,) if checked else (RunFailedError,)
     try:
         scenario = load_scenario("default", ["train.distance=60", "numerics.time_step=0.001"])
@@ -147,5 +147,5 @@ def _unstable(path: Path, checked: bool) -> Check:
     except expected as error:
         said = str(error)
     finally:
-        prepare.TOLERATED_GROWTH = tolerated
+        vars(prepare)["TOLERATED_GROWTH"] = tolerated
     return {"words": words, "good": bool(said), "said": said, "wrong": [] if said else ["not noticed"]}

@@ -22,10 +22,10 @@ class Run:
     """A run to disturb.
 
     Attributes:
-        words: What it is.
+        words: Description.
         scenario: Built-in scenario.
-        settings: ``KEY=VALUE``.
-        workers: Processes.
+        settings: Overrides ``KEY=VALUE``.
+        workers: Number of processes.
     """
 
     words: str
@@ -35,17 +35,17 @@ class Run:
 
     @property
     def arguments(self) -> list[str]:
-        """Of the command, its output apart."""
+        """Arguments of the command, without its output."""
         chosen = [word for each in (*DATA["common"]["settings"], *self.settings) for word in ("--set", each)]
         return ["run", self.scenario, *chosen, *self.effort]
 
     @property
     def effort(self) -> list[str]:
-        """Arguments that ``resume`` takes as well."""
+        """Arguments that ``resume`` accepts as well."""
         return ["--workers", str(self.workers), "--checkpoint", str(CHECKPOINT), "--quiet"]
 
     def shorter(self, metres: float) -> Run:
-        """The same over another way."""
+        """The same run over another distance."""
         return replace(self, settings=(*self.settings, f"train.distance={metres:g}"))
 
 
@@ -54,12 +54,12 @@ RUNS = {name: Run(**table | {"settings": tuple(table["settings"])}) for name, ta
 
 @dataclass(frozen=True)
 class Kill:
-    """A process killed at some instant.
+    """A process to kill at some instant.
 
     Attributes:
         run: Name of the run.
         victim, moment, start, again: See ``cases.toml``.
-        part: Of the time that the moment leaves open, 0...1.
+        part: Share of the time that the moment leaves open, 0...1.
         then: The same for the second kill.
     """
 
@@ -73,12 +73,12 @@ class Kill:
 
 
 def kills(run: str, share: float = 1.0, seed: int = SEED) -> list[Kill]:
-    """Every kill of a run.
+    """All kills of a run.
 
     Args:
-        run: Its name.
-        share: Of the counts, rounded up.
-        seed: Of the instants.
+        run: Name of the run.
+        share: Share of the counts, rounded up.
+        seed: Seed of the instants.
     """
     rng = np.random.default_rng([seed, len(run)])
     (table,) = (each for each in DATA["kills"] if each["run"] == run)

@@ -1,9 +1,9 @@
-"""A power cut: what was written since the last fsync reaches the disk in part, in any order.
+"""Power cuts: data written since the last fsync reach the disk in part, in any order.
 
-The system calls of a session are recorded with their bytes. At an instant, a disk is made up as a journalling file
-system may have left it: of every file the bytes of its last fsync and, of what was written since, each write or not,
-or its beginning; of the folder's names those of its last fsync and the first few changes since, in order. The result
-file must be as of the last commit, or of the one that was under way.
+The system calls of a session are recorded with their bytes. For an instant, a disk is constructed in a state that a
+journalling file system may leave: of every file the bytes of its last fsync and any selection of later writes, in whole
+or in part; of the folder's names those of its last fsync and the first few changes since, in order. The result
+file must be as of the last commit, or of the one in progress.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ TORN = 512  # bytes that a disk writes at once
 
 
 def power_cuts(draws: int, stride: int = 1) -> Boundaries:
-    """Every session, cut off at every ``stride``-th call, ``draws`` times."""
+    """Run every session, with power cuts at every ``stride``-th call, ``draws`` times each."""
     found, rng = Boundaries(), np.random.default_rng(SEED)
     with TemporaryDirectory(prefix="tiengine-power-", dir=memory_folder()) as top:
         for name, (session, prepare) in SESSIONS.items():
@@ -52,7 +52,7 @@ def power_cuts(draws: int, stride: int = 1) -> Boundaries:
 
 
 def _recorded(session: Callable[[Path], None], folder: Path) -> list[Call]:
-    """Calls of a session."""
+    """Record the calls of a session."""
     calls: list[Call] = []
     with watched(lambda call, half: calls.append(call)):
         session(folder)
@@ -64,7 +64,7 @@ class _File:
     """A file on the disk.
 
     Attributes:
-        content: As of its last fsync.
+        content: Content as of its last fsync.
         since: Writes and truncations since then.
     """
 
@@ -77,7 +77,7 @@ class _File:
         self.since.clear()
 
     def change(self, call: Call, count: int) -> None:
-        """Carry out a call, of a write so many bytes."""
+        """Perform a call, of a write only the given number of bytes."""
         if call.kind == "truncate":
             del self.content[call.offset :]
             self.content.extend(bytes(call.offset - len(self.content)))
@@ -86,7 +86,7 @@ class _File:
         self.content[call.offset : call.offset + count] = call.data[:count]
 
     def cut_off(self, rng: Any) -> None:
-        """Let some of what was written since the last fsync reach the disk."""
+        """Let a part of the writes since the last fsync reach the disk."""
         for call in self.since:
             fate = rng.random()
             torn = TORN * int(rng.integers(len(call.data) // TORN + 1))
@@ -94,19 +94,19 @@ class _File:
 
 
 class _Disk:
-    """Files and names."""
+    """Files and names of a folder."""
 
     def __init__(self, folder: Path) -> None:
         self.names = {each.name: _File(bytearray(each.read_bytes())) for each in folder.iterdir()}
         self.now = dict(self.names)
         self.open = dict(self.names)
-        """Files by the name under which they were opened last."""
+        """Files by the name under which they were last opened."""
         self.since: list[dict[str, _File]] = []
         """Names after each change since the folder's last fsync."""
 
     @classmethod
     def after(cls, calls: Sequence[Call], template: Path, rng: Any) -> _Disk:
-        """The disk when power fails after some calls."""
+        """State of the disk if power fails after the given calls."""
         disk = cls(template)
         for call in calls:
             disk._take(call)

@@ -1,4 +1,4 @@
-"""A run that notes what it writes, so that a killed one can be told from what it had promised.
+"""A run that logs what it writes, so that the file of a killed run can be compared with its commits.
 
 ``python -m validation.faults.record LOG ARGUMENTS...`` is the command ``tiengine ARGUMENTS...`` with a line in LOG for
 every block of samples written, and one for every commit, after it. The lines survive the process.
@@ -23,14 +23,14 @@ REAL = 4  # bytes of a channel's value: output.precision is "single"
 
 @dataclass(frozen=True)
 class Record:
-    """What a run has noted.
+    """Log of a run.
 
     Attributes:
-        loop: Whether it had begun to write samples.
-        commits: How often it has committed.
-        rows: Rows of every group of every train with its last commit.
-        lost_samples: Of wheels, written since then.
-        lost_bytes: Of all samples written since then.
+        loop: Whether the run had begun to write samples.
+        commits: Number of commits.
+        rows: Rows of every group of every train at its last commit.
+        lost_samples: Samples of wheels written since then.
+        lost_bytes: Bytes of all samples written since then.
     """
 
     loop: bool
@@ -41,7 +41,7 @@ class Record:
 
 
 def recorded(log: Path) -> None:
-    """Let the writer of this process note what it does.
+    """Let the writer of this process log its blocks and commits.
 
     Args:
         log: File to append to.
@@ -69,10 +69,10 @@ def recorded(log: Path) -> None:
 
 
 def read(log: Path) -> Record:
-    """What a run has noted until it ended."""
+    """Read the log of a run."""
     lines = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     commits = [line for line in lines if "rows" in line]
-    last = commits[-1] if commits else {"rows": {}, "samples": 0, "bytes": 0}
+    last: dict[str, Any] = commits[-1] if commits else {"rows": {}, "samples": 0, "bytes": 0}
     end = lines[-1] if lines else last
     lost = end["samples"] - last["samples"], end["bytes"] - last["bytes"]
     return Record(any(line["samples"] for line in lines), len(commits), last["rows"], *lost)

@@ -1,4 +1,4 @@
-"""A disk that fills up, one that cannot be written to, and estimates of what a run needs."""
+"""Full disks, read-only disks, and estimates of the space that a run needs."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from validation.faults.launch import Process
 __all__ = ["Check", "disk_full", "estimates", "read_only", "refused_at_the_start", "small_disk"]
 
 Check = dict[str, Any]
-"""What was tried (``words``), whether it went well (``good``), and what else is to be said."""
+"""An experiment (``words``), whether it succeeded (``good``), and a note."""
 
 DISK = 64_000_000  # bytes
 LEFT = (0, 60_000, 150_000, 300_000, 600_000, 1_000_000, 1_600_000, 2_500_000, 3_400_000, 4_200_000)
-"""Bytes left on a disk after a run has made its file; the whole one takes 4.8 MB, its checkpoint 0.2 MB."""
+"""Bytes left on a disk after a run has created its file; the complete file takes 4.8 MB, its checkpoint 0.2 MB."""
 
 SIZES = (
     ("paper", "train.distance=100"),
@@ -39,7 +39,7 @@ SIZES = (
 
 @contextmanager
 def small_disk(folder: Path, size: int = DISK) -> Iterator[bool]:
-    """A small file system in a folder; whether there is one (it takes root)."""
+    """Mount a small file system in a folder; return whether that succeeded (it needs root)."""
     words = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
     mounted = shutil.which("mount") is not None and subprocess.run(words, capture_output=True).returncode == 0
     try:
@@ -50,7 +50,7 @@ def small_disk(folder: Path, size: int = DISK) -> Iterator[bool]:
 
 
 def disk_full(yard: Yard, left: int) -> Check:
-    """A run whose disk has only so many bytes left once its file is there; then room again, and resume."""
+    """Run with only the given bytes left after the file exists; then make room, and resume."""
     words = f"disk full: {left / 1e6:.2f} MB left once the file is there"
     folder = yard.place()
     with small_disk(folder) as mounted:
@@ -71,7 +71,7 @@ def disk_full(yard: Yard, left: int) -> Check:
 
 
 def refused_at_the_start(yard: Yard) -> Check:
-    """A disk that is too small from the beginning."""
+    """Run on a disk that is too small from the beginning."""
     folder = yard.place()
     words = "disk too small from the beginning: refused, saying how much is missing"
     with small_disk(folder, 1_000_000) as mounted:
@@ -86,7 +86,7 @@ def refused_at_the_start(yard: Yard) -> Check:
 
 
 def read_only(yard: Yard) -> list[Check]:
-    """A folder that cannot be written to: for a new file, and for one to be resumed; then it can."""
+    """Run and resume in a read-only folder; resume again after it has become writable."""
     folder, checks = yard.place(), []
     with small_disk(folder) as mounted:
         if not mounted:
@@ -119,7 +119,7 @@ def read_only(yard: Yard) -> list[Check]:
 
 
 def estimates(folder: Path) -> list[Check]:
-    """Estimated and true sizes of some runs."""
+    """Compare estimated and true sizes of some runs."""
     found = []
     for i, (name, *settings) in enumerate(SIZES):
         scenario = load_scenario(name, settings)
@@ -135,7 +135,7 @@ def estimates(folder: Path) -> list[Check]:
 
 
 def _fill(ballast: Path, left: int) -> None:
-    """Write a file that leaves some bytes on its disk."""
+    """Write a file that leaves the given bytes on its disk."""
     with ballast.open("wb", buffering=0) as file:
         try:
             while True:
@@ -148,7 +148,7 @@ def _fill(ballast: Path, left: int) -> None:
 
 
 def _stopped_clearly(process: Process) -> list[str]:
-    """What is wrong with the end of a run that could not go on."""
+    """Errors in the way a run ended that could not continue."""
     said = process.said.strip()
     bad = [f"exit status {process.status}"] if process.status != 2 else []
     if not said.startswith("error: ") or "\n" in said:

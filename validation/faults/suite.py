@@ -1,4 +1,4 @@
-"""What the suite does: parts that run side by side, each in a process of its own."""
+"""Parts of the suite, which run in parallel, each in a process of its own."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ STARTS = {"copy": "copies of a process that has compiled", "command": "the comma
 
 @dataclass(frozen=True)
 class Part:
-    """Something to do.
+    """A part of the suite.
 
     Attributes:
-        words: What it is.
-        call: Does it, in a folder; takes the share of the whole effort.
-        alone: Whether nothing else may run meanwhile.
+        words: Description.
+        call: Function of a folder and the share of the whole effort.
+        alone: Whether no other part may run at the same time.
     """
 
     words: str
@@ -35,7 +35,7 @@ class Part:
 
 
 def _kills(run: str, start: str, folder: Path, share: float) -> Found:
-    """Random kills of a run that is started in one way."""
+    """Random kills of a run with one kind of start."""
     from validation.faults.kills import Yard
     from validation.faults.plan import RUNS, kills
 
@@ -80,7 +80,7 @@ def _power(folder: Path, share: float) -> Found:
 
 
 def _disk(folder: Path, share: float) -> Found:
-    """Disks that fill up or cannot be written to."""
+    """Full and read-only disks."""
     from validation.faults import space
     from validation.faults.kills import Yard
     from validation.faults.plan import RUNS
@@ -104,7 +104,7 @@ def _disturbances(folder: Path, share: float) -> Found:
     from validation.faults.plan import RUNS
 
     places = clock_readers(Path(str(tiengine.__file__)).parent)
-    source = {"words": "places in the source that look at the clock of the day", "good": not places, "wrong": places}
+    source = {"words": "places in the source that read the time of day", "good": not places, "wrong": places}
     return {"checks": [source, *disturbances(Yard(folder, RUNS["one"]))]}
 
 
@@ -135,7 +135,7 @@ PARTS = {
     "batch": Part("kill -9, batch", partial(_kills, "batch", "copy")),
     "batch_command": Part("kill -9, batch, the command itself", partial(_kills, "batch", "command")),
     "boundaries": Part("death between any two system calls", _boundaries),
-    "power": Part("power cuts, made up", _power),
+    "power": Part("power cuts, constructed", _power),
     "disk": Part("disk full, read-only", _disk),
     "sizes": Part("estimated sizes", _sizes),
     "signals": Part("signals, two runs, readers, clock", _disturbances),
@@ -146,13 +146,13 @@ PARTS = {
 
 
 def perform(names: Sequence[str], share: float, jobs: int, keep: Callable[[str, Found], None]) -> None:
-    """Do parts.
+    """Run parts.
 
     Args:
-        names: Of the parts.
-        share: Of the whole effort.
-        jobs: Processes at a time.
-        keep: Called with the name and findings of each part as it ends.
+        names: Names of the parts.
+        share: Share of the whole effort.
+        jobs: Number of processes at a time.
+        keep: Function called with name and findings of each part as it ends.
     """
     together = [name for name in names if not PARTS[name].alone]
     apart = [name for name in names if PARTS[name].alone]
@@ -169,7 +169,7 @@ def _in_folder(name: str, share: float) -> Found:
     with TemporaryDirectory(prefix=f"tiengine-{name}-", ignore_cleanup_errors=True) as folder:
         try:
             return PARTS[name].call(Path(folder), share)
-        except Exception as error:  # the other parts go on; the page shows it
+        except Exception as error:  # the other parts continue; the page shows it
             import traceback
 
             traceback.print_exc()

@@ -1,4 +1,4 @@
-"""One number, or one row of numbers, that the engine is held to."""
+"""Cases: one number, or one row of numbers, against a reference with a tolerance."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ class Case:
     """One row of the table.
 
     Attributes:
-        name: Unique; ``--only`` takes it or its beginning.
-        kind: ``verification`` against a closed form, ``validation`` against others' numbers,
-            ``full length`` against the traditional model, ``convergence`` against ourselves at a finer step or mesh,
-            ``information`` without a judgement.
-        quantity: What is compared, with its unit.
-        source: Where the reference comes from.
+        name: Unique name; ``--only`` takes it or its beginning.
+        kind: ``verification`` against a closed form, ``validation`` against published numbers,
+            ``full length`` against the traditional model, ``convergence`` against the engine at a finer step or mesh,
+            ``information`` without a verdict.
+        quantity: Compared quantity, with its unit.
+        source: Source of the reference.
         reference: The number or numbers; computed if it is a closed form.
-        why: Reason of the tolerance, or of leaving the case out.
-        compute: Our number, of the reference's shape; None if the case is left out.
-        rtol: Tolerance as a part of the reference.
+        why: Reason for the tolerance, or for leaving the case out.
+        compute: The engine's number, of the reference's shape; None if the case is left out.
+        rtol: Tolerance relative to the reference.
         atol: Tolerance in the quantity's unit; may differ from number to number.
         rule: Whether the reference is a value to meet or a bound.
         quick: Whether ``--quick`` runs it.
@@ -53,17 +53,17 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A case with its result; of many numbers, the one that uses most of its tolerance.
+    """A case with its result; if it has several numbers, the one that uses most of its tolerance.
 
     Cases for information have no tolerance and show all.
 
     Attributes:
-        case: What was asked.
-        verdict: Whether it was met.
+        case: The case.
+        verdict: Whether the tolerance is met.
         reference: Reference as text.
-        ours: Our number as text, or what went wrong.
-        deviation: Ours less the reference, as text.
-        tolerance: What was allowed, as text.
+        ours: The engine's number as text, or the error.
+        deviation: The engine's number minus the reference, as text.
+        tolerance: Allowed deviation as text.
         seconds: Wall time.
     """
 
@@ -77,7 +77,7 @@ class Outcome:
 
 
 def evaluate(case: Case) -> Outcome:
-    """Compute a case and judge it; an engine that refuses or fails is a miss that says why."""
+    """Compute and judge a case; an error of the engine is a miss with its message."""
     if case.compute is None:
         return Outcome(case, "left out")
     clock = time.perf_counter()
@@ -92,7 +92,7 @@ def evaluate(case: Case) -> Outcome:
 
 
 def _judge(case: Case, reference: Reals, ours: Reals, seconds: float) -> Outcome:
-    """Compare number by number and pick the worst."""
+    """Compare number by number and select the worst."""
     deviation = ours - reference
     allowed = case.rtol * np.abs(reference) + np.broadcast_to(_reals(case.atol), reference.shape)
     excess = {"within": np.abs(deviation), "at most": deviation, "at least": -deviation}[case.rule]
@@ -101,8 +101,8 @@ def _judge(case: Case, reference: Reals, ours: Reals, seconds: float) -> Outcome
     met = bool(np.all(excess <= allowed))  # false for a NaN as well
     worst = int(np.argmax(np.where(np.isnan(margin), np.inf, margin)))
     if case.kind == "information":
-        texts = (", ".join(_number(x) for x in values) for values in (reference, ours))
-        return Outcome(case, "for information", *texts, seconds=seconds)
+        wanted, found = (", ".join(_number(x) for x in values) for values in (reference, ours))
+        return Outcome(case, "for information", wanted, found, seconds=seconds)
     bound = "" if case.rule == "within" else case.rule + " "
     return Outcome(
         case,
@@ -124,7 +124,7 @@ def _number(value: float) -> str:
 
 
 def _deviation(deviation: float, reference: float) -> str:
-    """As a part of the reference where that says something."""
+    """Deviation as text, relative to the reference if that is meaningful."""
     if reference != 0.0 and abs(deviation) < abs(reference):
         return f"{100.0 * deviation / abs(reference):+.2g} %"
     return f"{deviation:+.2g}"

@@ -64,7 +64,7 @@ _FILES = (
 )
 
 CASES: tuple[Case, ...] = tuple(case for file in _FILES for case in file.CASES)
-"""Every case of every file."""
+"""All cases of all files."""
 
 HEADLINES = (
     "plate-aspect-1.5",
@@ -85,4 +85,4 @@ HEADLINES = (
     "ripple",
     "defects-seats",
 )
-"""The few cases that the README shows."""
+"""Cases shown in the README."""

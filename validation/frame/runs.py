@@ -1,4 +1,4 @@
-"""Runs of the engine that several cases share: each is made once a session and kept in memory."""
+"""Runs of the engine that several cases share: each is made once per session and kept in memory."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ def simulate(scenario: str, *overrides: str, public: bool = False) -> Forces:
     """Run a built-in scenario with changes, in double precision.
 
     Args:
-        scenario: Its name.
+        scenario: Name of the scenario.
         overrides: ``"train.speed_kmh=300"`` and the like.
-        public: Public Taichi calls only.
+        public: Whether to use public Taichi calls only.
     """
     with run(load_scenario(scenario, [DOUBLE, *overrides]), public_launch=public) as result:
         return _forces(result)
@@ -58,7 +58,7 @@ def full_length(scenario: str, numerics: FullLength, *overrides: str) -> Forces:
     """Run a built-in scenario with changes in the traditional full-length model, in double precision.
 
     Args:
-        scenario: Its name.
+        scenario: Name of the scenario.
         numerics: Rail, modes, step.
         overrides: ``"train.speed_kmh=300"`` and the like.
     """

@@ -18,20 +18,20 @@ __all__ = ["COLUMNS", "headlines", "insert", "keep", "markdown", "show"]
 
 COLUMNS = ("case", "quantity", "reference", "ours", "deviation", "tolerance", "source", "verdict")
 TEXTS = ("verdict", "reference", "ours", "deviation", "tolerance", "seconds")
-"""Of an outcome, what is kept from one run to the next."""
+"""Attributes of an outcome that are kept from one run to the next."""
 BEGIN, END = "<!-- verification -->", "<!-- /verification -->"
 TITLES = {
     "verification": "Against closed forms",
-    "validation": "Against other people's numbers",
+    "validation": "Against published numbers",
     "full length": "Against the traditional full-length model",
-    "convergence": "Against ourselves, finer",
+    "convergence": "Against finer settings of the engine",
     "information": "For information",
 }
 _COLOURS = {"ok": "green", "MISS": "bold red", "for information": "dim", "left out": "yellow"}
 
 
 def _row(outcome: Outcome) -> tuple[str, ...]:
-    """Texts in the order of :data:`COLUMNS`."""
+    """Cells of a case in the order of :data:`COLUMNS`."""
     case = outcome.case
     tolerance = f"{outcome.tolerance}: {case.why}" if outcome.tolerance else case.why
     return (
@@ -62,7 +62,7 @@ def show(outcomes: Sequence[Outcome], console: Console) -> None:
 
 
 def markdown(outcomes: Sequence[Outcome]) -> str:
-    """The same as Markdown, headed by what it was computed with."""
+    """Format the tables as Markdown, with score and versions."""
     versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("tiengine", "taichi", "numpy", "scipy"))
     lines = [
         f"{_score(outcomes)} Python {platform.python_version()}, {versions}.",
@@ -77,7 +77,7 @@ def markdown(outcomes: Sequence[Outcome]) -> str:
 
 
 def headlines(outcomes: Sequence[Outcome], names: Sequence[str]) -> str:
-    """The README's share: how many cases are met, and the few that say most."""
+    """Format the README's table: the score, and a few selected cases."""
     columns = ("quantity", "reference", "ours", "tolerance", "source")
     lines = [f"{_score(outcomes)} All of them: [table](validation/report/verification.md).", ""]
     lines += [_line(columns), _line(["---"] * len(columns))]
@@ -97,15 +97,15 @@ def _score(outcomes: Sequence[Outcome]) -> str:
 
 
 def keep(outcomes: Sequence[Outcome], file: Path, cases: Sequence[Case]) -> list[Outcome]:
-    """Add outcomes to those of earlier runs, so that a few cases can be computed anew without all the others.
+    """Add outcomes to those of earlier runs, so that a few cases can be computed again without the others.
 
     Args:
-        outcomes: New ones.
+        outcomes: New outcomes.
         file: JSON with the texts of each case, rewritten.
-        cases: All cases; what belongs to none of them any more is dropped.
+        cases: All cases; outcomes of cases that no longer exist are dropped.
 
     Returns:
-        Everything known, in the order of the cases.
+        All known outcomes, in the order of the cases.
     """
     known = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     for outcome in outcomes:
@@ -116,7 +116,7 @@ def keep(outcomes: Sequence[Outcome], file: Path, cases: Sequence[Case]) -> list
 
 
 def insert(text: str, file: Path) -> None:
-    """Put a text between the markers of a Markdown file; markers are added at its end if it has none."""
+    """Insert a text between the markers of a Markdown file; without markers, they are added at its end."""
     old = file.read_text(encoding="utf-8") if file.exists() else ""
     if BEGIN not in old or END not in old:
         old = f"{old.rstrip()}\n\n{BEGIN}\n{END}\n".lstrip()

@@ -1,1 +1,1 @@
-"""The traditional full-length model (Zhai's modal superposition), the yardstick of the moving window."""
+"""The traditional full-length model (Zhai's modal superposition), the reference of the moving window."""

@@ -1,8 +1,8 @@
-"""The two launches of a pass of the full-length model; seats and slabs lie between them on the host.
+"""The two launches of a pass of the full-length model; between them the host computes seats and slabs.
 
 ``rails[row, 5 rail + field, i]`` holds the modal coordinates (rows as in the engine's ``layout``; fields w, theta_y, v,
-theta_z, theta_x). ``motion`` holds the vehicle alone, so that the engine's vehicle and contact functions serve here as
-they are. Everything that couples a rail's modes runs over seats (host) or over wheels (here).
+theta_z, theta_x). ``motion`` holds only the vehicle, so that the engine's vehicle and contact functions can be used
+unchanged. Everything that couples a rail's modes is a loop over seats (host) or over wheels (here).
 """
 
 import taichi as ti
@@ -31,7 +31,7 @@ W, THETA_Y, V, THETA_Z, THETA_X = range(FIELDS)
 
 @ti.func
 def predict_rails(constants: Array, numbers: Array, stiffness: Array, rails: Array):
-    """Newmark predictors, and -K u at them in row LINEAR."""
+    """Compute the Newmark predictors, and -K u at them in row LINEAR."""
     dt, half_beta, half_gamma = constants[at.DT], numbers[m.HALF_BETA_DT2], numbers[m.HALF_GAMMA_DT]
     for f in ti.static(range(2 * FIELDS)):
         for i in range(rails.shape[2]):
@@ -53,7 +53,7 @@ def predict_rails(constants: Array, numbers: Array, stiffness: Array, rails: Arr
 
 @ti.func
 def fold(numbers: Array, target: Array, sign: Array, rails: Array, folded: Array):
-    """The rails' pull at the seats, folded for the sine transform: rows vertical, moment, lateral, each by rail."""
+    """Rails' forces at the seats, folded for the sine transform: rows vertical, moment, lateral, each by rail."""
     kv, cv, kl, cl = numbers[m.KV], numbers[m.CV], numbers[m.KL], numbers[m.CL]
     a, base2 = numbers[m.ARM], numbers[m.BASE2]
     for row in ti.static(range(6)):
@@ -73,7 +73,7 @@ def fold(numbers: Array, target: Array, sign: Array, rails: Array, folded: Array
 
 @ti.func
 def wheel_shapes(position: float, numbers: Array, wheelset_x: Array, shape: Array):
-    """sin(k_i x) and k_i cos(k_i x) under every wheelset, by turning one mode on from the one before."""
+    """Compute sin(k_i x) and k_i cos(k_i x) under every wheelset, by rotation from each mode to the next."""
     for w in range(wheelset_x.shape[0]):
         k = ti.math.pi / numbers[m.RAIL_LENGTH]
         angle = k * (position + wheelset_x[w] - numbers[m.X_REAR])
@@ -89,7 +89,7 @@ def wheel_shapes(position: float, numbers: Array, wheelset_x: Array, shape: Arra
 
 @ti.func
 def compliances(inverse: Array, shape: Array, compliance: Array):
-    """A and a' under a wheelset by unit forces there, in w, v, theta_x: ``compliance[w, value or slope, w, 3, 3]``."""
+    """Value and slope of w, v, theta_x under a wheelset by unit forces there, shape (W, 2, W, 3, 3)."""
     for w in range(shape.shape[1]):
         for kind in ti.static(range(2)):
             total = ti.Vector.zero(ti.f64, 4)
@@ -116,7 +116,7 @@ def wheel_load(rail: Template, i: int, shape: Array, force: Array):
 
 @ti.func
 def respond(i: int, inverse: Array, r: Template):
-    """A^-1 r of one mode: r and the answer are w, theta_y, v, theta_z, theta_x."""
+    """A^-1 r of one mode; r and the result are w, theta_y, v, theta_z, theta_x."""
     x = ti.Vector.zero(ti.f64, FIELDS)
     x[0] = inverse[m.INV_WW, i] * r[0] + inverse[m.INV_WT, i] * r[1]
     x[1] = inverse[m.INV_WT, i] * r[0] + inverse[m.INV_TT, i] * r[1]
@@ -131,7 +131,7 @@ def solve_rails(
     numbers: Array, constants: Array, inverse: Array, target: Array, sign: Array, folded: Array,
     shape: Array, force: Array, rails: Array,
 ):  # fmt: skip
-    """Accelerations of all modes from linear forces, seats and the wheels' forces known so far."""
+    """Compute the accelerations of all modes from linear forces, seats and the wheels' forces known so far."""
     a, base2, sv, sl = numbers[m.ARM], numbers[m.BASE2], numbers[m.SMEAR_V], numbers[m.SMEAR_L]
     for rail in ti.static(range(2)):
         for i in range(rails.shape[2]):
@@ -154,7 +154,7 @@ def solve_rails(
 
 @ti.func
 def add_wheels(constants: Array, inverse: Array, shape: Array, increment: Array, rails: Array):
-    """Add the rails' answer to a change of the wheels' forces."""
+    """Add the rails' response to a change of the wheels' forces."""
     for rail in ti.static(range(2)):
         for i in range(rails.shape[2]):
             g = wheel_load(rail, i, shape, increment)
@@ -166,7 +166,7 @@ def add_wheels(constants: Array, inverse: Array, shape: Array, increment: Array,
 
 @ti.func
 def update_rails(constants: Array, rails: Array):
-    """Newmark correctors."""
+    """Apply the Newmark correctors."""
     for f in ti.static(range(2 * FIELDS)):
         for i in range(rails.shape[2]):
             rails[at.U, f, i] = rails[at.U_PREDICTED, f, i] + constants[at.BETA_DT2] * rails[at.A, f, i]
@@ -175,7 +175,7 @@ def update_rails(constants: Array, rails: Array):
 
 @ti.func
 def rail_under_wheel(wheelset: int, rail: Template, speed: float, shape: Array, rails: Array, rail_out: Array):
-    """w, v, theta_x, their slopes, their rates as the moving wheel sees them (material rate and V times slope)."""
+    """w, v, theta_x, their slopes, and their rates in the frame of the wheel (material rate and V times slope)."""
     for n, f in ti.static(enumerate((5 * rail + W, 5 * rail + V, 5 * rail + THETA_X))):
         value, slope, rate = 0.0, 0.0, 0.0
         for i in range(rails.shape[2]):
@@ -189,7 +189,7 @@ def rail_under_wheel(wheelset: int, rail: Template, speed: float, shape: Array, 
 
 @ti.func
 def predict_vehicle(constants: Array, numbers: Array, speed: float, K: Array, C: Array, C_speed: Array, motion: Array):
-    """Predictors of the vehicle, iterate at them, and -(C v + K u) there."""
+    """Compute the predictors of the vehicle, set the iterate to them, and compute -(C v + K u) there."""
     n, dt = motion.shape[1], constants[at.DT]
     for i in range(n):
         u, v, a = motion[at.U, i], motion[at.V, i], motion[at.A, i]
@@ -207,7 +207,7 @@ def predict_vehicle(constants: Array, numbers: Array, speed: float, K: Array, C:
 
 @ti.func
 def update_vehicle(constants: Array, motion: Array):
-    """Newmark correctors."""
+    """Apply the Newmark correctors."""
     for i in range(motion.shape[1]):
         motion[at.U, i] = motion[at.U_PREDICTED, i] + constants[at.BETA_DT2] * motion[at.A, i]
         motion[at.V, i] = motion[at.V_PREDICTED, i] + constants[at.GAMMA_DT] * motion[at.A, i]
@@ -224,7 +224,7 @@ def wheelset_now(wheelset: int, row: Template, dof: Array, motion: Array):
 
 @ti.func
 def keep_forces(force: Array, rail: Array, force_before: Array, rail_before: Array):
-    """Remember the contact forces of the pass before."""
+    """Keep the contact forces of the previous pass."""
     for w in range(force.shape[1]):
         for k in ti.static(range(5)):
             force_before[0, w, k] = force[0, w, k]
@@ -235,7 +235,7 @@ def keep_forces(force: Array, rail: Array, force_before: Array, rail_before: Arr
 
 @ti.func
 def keep_increments(force: Array, rail: Array, force_before: Array, rail_before: Array):
-    """Replace the contact forces of the pass before by the change since."""
+    """Replace the contact forces of the previous pass by the change since then."""
     for w in range(force.shape[1]):
         for k in ti.static(range(5)):
             force_before[0, w, k] = force[0, w, k] - force_before[0, w, k]
@@ -280,7 +280,7 @@ def explicit_forces(
     folded_out: Reals2,
     motion: Reals2,
 ):
-    """Predictors (first pass), the rails' pull at the seats, the vehicle's forces; shapes as in the host modules."""
+    """Compute predictors (first pass), rails' forces at the seats, vehicle's forces; shapes as in the host modules."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         step = tick[at.STEP]
@@ -328,7 +328,7 @@ def implicit_and_contact(
     rail_before_out: Reals4,
     wheel_record_out: Reals5,
 ):
-    """Rails mode by mode, then contact against the compliance of rail and wheelset at the wheels' places."""
+    """Solve the rails mode by mode, then contact against the compliance of rail and wheelset at the wheels."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         step = tick[at.STEP]

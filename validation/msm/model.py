@@ -1,4 +1,4 @@
-r"""The full-length track: constant arrays (MODEL of the traditional method: modes of the whole rail, all slabs).
+r"""Constant arrays of the full-length track: modes of the whole rail, all slabs.
 
 A simply supported Timoshenko rail of length L, fixed to the ground, sin(k_i x) for w, v, theta_x and cos(k_i x) for
 theta_y, theta_z, k_i = i pi / L. Per mode, over L/2:
@@ -7,11 +7,11 @@ theta_y, theta_z, k_i = i pi / L. Per mode, over L/2:
     lateral:   the same with the lateral section, and  rho Ip, GK k^2             (v, theta_z; theta_x)
 
 Newmark's operator M + beta dt^2 K + A_s is solved mode by mode: A_s holds the fastenings smeared along the rail, which
-keeps the passes from diverging and drops out as they converge (Hughes and Liu 1978). A slab's operator holds its bed
+keeps the passes from diverging and cancels as they converge (Hughes and Liu 1978). A slab's operator holds its bed
 and its own side of the seats.
 
 Shared with the engine: vehicle, contact, irregularity and the start's contact forces. Rails, fastenings, slabs and
-mortar are written anew.
+mortar are programmed independently.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ __all__ = ["FullTrack", "SlabGroup", "build_track", "whole_seats"]
 """Entries of ``numbers``: fastening, a, b^2, smeared operator per mode, rear end and length of the rail, predictors."""
 
 REAR_MARGIN = 10.0
-"""Least rail behind the last wheel at the start [m]; the rail begins at the joint of slabs before it."""
+"""Least length of rail behind the last wheel at the start [m]; the rail begins at the slab joint before that."""
 
 
 @dataclass(frozen=True, eq=False)
 class SlabGroup:
-    """Slabs of one design: sound ones, or one with voids or failed fastenings.
+    """Slabs of one design: all sound slabs, or one slab with voids or failed fastenings.
 
     Attributes:
         slab: Modal matrices.
@@ -74,13 +74,14 @@ class FullTrack:
     Attributes:
         rail_length: L [m], whole seat pitches.
         modes: N.
-        first_slab: Index along the track of the rail's first slab; its first seat is first_slab times seats a slab.
+        first_slab: Index along the track of the rail's first slab; its first seat is first_slab times the seats per
+            slab.
         rear: Chainage of the rail's rear end [m].
         transform: Sums over seats.
         stiffness: Rows by mode, shape (7, N).
         mass: mu L/2 of w, theta_y, v, theta_z, theta_x, shape (5,).
         inverse: Rows of inverses by mode, shape (9, N).
-        seat_scale: Factors of the fastenings, 0 beyond the rail's end, shape (2, slabs, seats a slab).
+        seat_scale: Factors of the fastenings, 0 beyond the rail's end, shape (2, slabs, seats per slab).
         groups: Slabs by design, the sound ones first.
         seat: Seat rows of the sound slab as factors of one product: [w, dw/dy] by side, shape (4, m, seats).
         numbers, dims, constants: For the kernels.
@@ -90,7 +91,7 @@ class FullTrack:
         rail, fastening, mortar: Parameters.
         dead_pressure: Weight of a slab on its bed [Pa].
         newmark: Step and coefficients.
-        passes: Passes a step.
+        passes: Passes per step.
     """
 
     rail_length: float
@@ -125,17 +126,17 @@ class FullTrack:
 
     @property
     def slabs(self) -> int:
-        """Slabs on the rail's length."""
+        """Number of slabs along the rail."""
         return self.seat_scale.shape[1]
 
     @property
     def slab_modes(self) -> int:
-        """Plate modes of a slab."""
+        """Number of plate modes of a slab."""
         return self.seat.shape[1]
 
     @property
     def dof_counts(self) -> dict[str, int]:
-        """Degrees of freedom: vehicles, rails, slabs, all."""
+        """Degrees of freedom of vehicles, rails, slabs, and in all."""
         counts = {
             "vehicles": self.train.n_dof,
             "rails": 2 * 5 * self.modes,
@@ -145,7 +146,7 @@ class FullTrack:
 
 
 def whole_seats(length: float, pitch: float) -> int:
-    """Seats on a rail of about a length [m]: near length/pitch, made of small primes, for a fast transform."""
+    """Number of seats near length/pitch, length in m, with small prime factors for a fast transform."""
     near = round(length / pitch)
     return min(range(near - 3, near + 4), key=lambda n: (_largest_prime(n), abs(n - near)))
 
@@ -156,27 +157,27 @@ def build_track(
     """Assemble and factorise.
 
     Args:
-        scenario: What is run.
-        given: The engine's parts: vehicle, contact, and the parameters of rail, fastening, slab and mortar.
-        length: Rail [m]; taken to whole seats.
-        modes_per_metre: Trial functions a field and metre.
-        slab_modes: Plate modes a slab.
+        scenario: Scenario to run.
+        given: Parts of the engine: vehicle, contact, and the parameters of rail, fastening, slab and mortar.
+        length: Length of the rail [m]; rounded to whole seats.
+        modes_per_metre: Trial functions per field and metre.
+        slab_modes: Plate modes per slab.
 
     Raises:
-        InputError: Mortar that does not pull, which the traditional model has not.
+        InputError: Mortar without tension, which the traditional model lacks.
     """
     if given.mortar.no_tension:
         raise InputError("track.mortar_no_tension = true: the full-length model's mortar is linear")
     d, per_slab = given.slab.fastening_pitch, given.slab.fastenings
     seats = whole_seats(length, d)
     L = seats * d
-    modes = round(modes_per_metre * L)  # 0.2 % fewer a metre would change forces by 0.1 % of their peak
+    modes = round(modes_per_metre * L)  # 0.2 % fewer per metre would change forces by 0.1 % of their peak
     first_wheel = scenario.rear + scenario.centre_in_window + float(given.train.wheelset_x.min())
     first_slab = int(np.floor((first_wheel - REAR_MARGIN) / given.slab.pitch))
     scale = _seat_scale(given, first_slab * per_slab, seats, per_slab)
     groups = _slab_groups(scenario, given, scale, first_slab, slab_modes)
     stiffness, mass = _rail(given.rail, L, modes)
-    per_mode = max(1.0, 0.5 * modes / seats) * L / (2.0 * d)  # half of what waves that coincide at the seats feel
+    per_mode = max(1.0, 0.5 * modes / seats) * L / (2.0 * d)  # half of the factor of waves that coincide at the seats
     numbers = _numbers(given, per_mode, first_slab * given.slab.pitch, L)
     sound = groups[0].slab.seat
     return FullTrack(
@@ -218,7 +219,7 @@ def _largest_prime(n: int) -> int:
 
 
 def _seat_scale(given: Ingredients, first_seat: int, seats: int, per_slab: int) -> Reals:
-    """Factors of all seats by slab, shape (2, slabs, seats a slab)."""
+    """Factors of all seats by slab, shape (2, slabs, seats per slab)."""
     slabs = -(-seats // per_slab)
     scale = np.zeros((slabs * per_slab, 2))
     scale[:seats] = given.seat_factors(first_seat, seats)
@@ -228,7 +229,7 @@ def _seat_scale(given: Ingredients, first_seat: int, seats: int, per_slab: int) 
 def _slab_groups(
     scenario: Scenario, given: Ingredients, scale: Reals, first_slab: int, slab_modes: int
 ) -> tuple[SlabGroup, ...]:
-    """The sound slabs, then each slab that has a void or a fastening that is not sound."""
+    """Group the sound slabs, then each slab that has a void or a fastening that is not sound."""
     slabs = scale.shape[1]
     voids = {i: [v for v in scenario.track.mortar_voids if v.slab == first_slab + i] for i in range(slabs)}
     odd = [i for i in range(slabs) if voids[i] or (scale[:, i] != 1.0).any()]
@@ -254,8 +255,7 @@ def _slab_inverse(given: Ingredients, slab: ModalSlab, scale: Reals) -> Reals:
         w, slope = slab.seat[0, side], b * slab.seat[1, side]
         A[:m, :m] += vertical * ((w * scale[side]) @ w.T + (slope * scale[side]) @ slope.T)
         A[m:, m:] += lateral * ((across * scale[side]) @ across.T)
-    inverse: Reals = np.linalg.inv(A)
-    return inverse
+    return np.asarray(np.linalg.inv(A), dtype=np.float64)
 
 
 def _rail(r: Rail, L: float, modes: int) -> tuple[Reals, Reals]:
@@ -309,7 +309,7 @@ def _numbers(given: Ingredients, per_mode: float, rear: float, L: float) -> Real
 
 
 def _dims(given: Ingredients) -> NDArray[np.int32]:
-    """What the shared vehicle and contact kernels read; the vehicle is all that is in their ``motion``."""
+    """Dimensions for the shared vehicle and contact kernels; their ``motion`` holds only the vehicle."""
     dims = np.zeros(at.N_DIMS, dtype=np.int32)
     dims[at.TRAINS], dims[at.VEHICLE_DOFS], dims[at.WHEELSETS] = 1, given.train.n, len(given.train.wheelset_x)
     dims[at.BODIES], dims[at.CROSS_LEVEL_ROLLS] = len(given.train.body_names), int(given.cross_level_rolls)
@@ -317,7 +317,7 @@ def _dims(given: Ingredients) -> NDArray[np.int32]:
 
 
 def _missing(r: Rail, L: float, modes: int, terms: int = 200_000) -> Reals:
-    """Static compliance in w, v, theta_x of the modes left out, sin^2 averaged: (1/L) sum over i > N."""
+    """Static compliance in w, v, theta_x of the omitted modes, sin^2 averaged: (1/L) sum over i > N."""
     k = np.arange(modes + 1, modes + terms) * np.pi / L
     shear = (np.sum(1.0 / (kappa * r.G * r.A * k**2)) for kappa in (r.kappa_vertical, r.kappa_lateral))
     bending = (np.sum(1.0 / (r.E * inertia * k**4)) for inertia in (r.Iy, r.Iz))
@@ -326,7 +326,7 @@ def _missing(r: Rail, L: float, modes: int, terms: int = 200_000) -> Reals:
 
 
 def _constants(given: Ingredients, missing: Reals) -> Reals:
-    """Numbers of step and contact that the shared kernels read."""
+    """Constants of step and contact for the shared kernels."""
     c = np.zeros(at.N_CONSTANTS)
     newmark, table = given.newmark, given.contact
     c[at.DT], c[at.BETA_DT2], c[at.GAMMA_DT] = newmark.dt, newmark.beta_dt2, newmark.gamma_dt

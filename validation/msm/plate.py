@@ -1,7 +1,7 @@
 """A slab for the full-length model: free-free modes of its plate, bed and seats on them.
 
-Written apart from the engine's slab, in NumPy: the Adini-Clough-Melosh element comes from its monomials. W are its
-shapes; the plate's matrices are
+Independent of the engine's slab, in NumPy: the Adini-Clough-Melosh element is built from its monomials. With its
+shape functions w, the plate's matrices are
 
     K = D_0 int [w_xx^2 + w_yy^2 + 2 nu w_xx w_yy + 2 (1 - nu) w_xy^2]
     M = rho h int w^2 + rho h^3/12 int (w_x^2 + w_y^2)
@@ -26,7 +26,7 @@ from tiengine.track.slab import Slab
 __all__ = ["ModalSlab", "modal_slab"]
 
 POWERS = np.array([(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (3, 1), (1, 3)])
-GAUSS = 4  # points a direction: products of two cubics need no more
+GAUSS = 4  # points per direction, enough for products of two cubics
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +35,12 @@ class ModalSlab:
 
     Attributes:
         mass: Diagonal of M, shape (m + 2,).
-        stiffness: Plate and bed, shape (m + 2, m + 2).
-        damping: Bed, shape (m + 2, m + 2).
+        stiffness: Stiffness of plate and bed, shape (m + 2, m + 2).
+        damping: Damping of the bed, shape (m + 2, m + 2).
         seat: Vertical and slope dw/dy at the seats, shape (2, 2, m, seats): quantity, side, mode, seat.
-        seat_x: Seats from the slab's centre [m], shape (seats,).
+        seat_x: Position of the seats from the slab's centre [m], shape (seats,).
         bed: w of the modes at the bed's sampling points, shape (m, points).
-        bed_factor: Bed factor there, shape (points,).
+        bed_factor: Factor of the bed there, shape (points,).
         omega: Circular frequencies of the free plate [rad/s], shape (m,).
     """
 
@@ -82,7 +82,7 @@ def modal_slab(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid], modes: i
         slab: Geometry and material.
         mortar: Its bed.
         voids: Voids of this slab.
-        modes: Plate modes kept, rigid ones included; all of the mesh if more than it has.
+        modes: Number of plate modes kept, including rigid ones; all of the mesh if it has fewer.
     """
     mesh = _Mesh(
         slab.elements_x,
@@ -94,7 +94,7 @@ def modal_slab(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid], modes: i
     kept = min(modes, mesh.size)
     omega2, phi = scipy.linalg.eigh(K, M, subset_by_index=(0, kept - 1))
     omega2[:3] = 0.0  # rigid motions, up to rounding
-    x = (np.arange(slab.fastenings) + 0.5) * slab.fastening_pitch - slab.pitch / 2.0
+    x = (np.arange(0.0, slab.fastenings) + 0.5) * slab.fastening_pitch - slab.pitch / 2.0
     y = slab.seat_half_spacing
     at_seats = np.stack([_values(mesh, slab, x, side * y) for side in (-1.0, 1.0)], axis=1)  # (2, side, seats, n)
     lateral = _lateral_bed(slab, voids)
@@ -117,7 +117,7 @@ def modal_slab(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid], modes: i
 
 
 def _shapes(mesh: _Mesh, x: Reals, y: Reals) -> Reals:
-    """w, w_x, w_y, w_xx, w_yy, w_xy of the twelve shapes at points of an element, shape (6, points, 12)."""
+    """w, w_x, w_y, w_xx, w_yy, w_xy of the twelve shape functions at points of an element, shape (6, points, 12)."""
     corners = np.array([(sx * mesh.a, sy * mesh.b) for sx in (-1, 1) for sy in (-1, 1)])
     nodal = np.stack([_monomials(corners[:, 0], corners[:, 1], *order) for order in ((0, 0), (1, 0), (0, 1))], axis=1)
     coefficients = np.linalg.inv(nodal.reshape(12, 12))
@@ -161,7 +161,7 @@ def _plate(slab: Slab, mesh: _Mesh, voids: Sequence[MortarVoid]) -> tuple[Reals,
 
 
 def _lost(slab: Slab, mesh: _Mesh, ex: int, ey: int, voids: Sequence[MortarVoid]) -> Reals:
-    """What voids take from int w^2 of an element: (1 - factor) times the integral over their share of it."""
+    """Part of int w^2 of an element removed by voids: (1 - factor) times the integral over their share of it."""
     lost = np.zeros((12, 12))
     cx, cy = (2 * ex + 1) * mesh.a, (2 * ey + 1) * mesh.b - slab.width / 2.0
     for void in voids:
@@ -184,7 +184,7 @@ def _box(left: float, right: float, low: float, high: float) -> tuple[Reals, Rea
 
 
 def _values(mesh: _Mesh, slab: Slab, x: Reals, y: float) -> Reals:
-    """Rows that take w and w_y at places of the slab from its DOFs, x and y from its centre; shape (2, places, n)."""
+    """Matrices from the slab's DOFs to w and w_y at points x and y from its centre, shape (2, points, n)."""
     rows = np.zeros((2, len(x), mesh.size))
     ey = int(np.clip((y + slab.width / 2.0) // (2 * mesh.b), 0, mesh.ny - 1))
     for i, place in enumerate(x):
@@ -197,7 +197,7 @@ def _values(mesh: _Mesh, slab: Slab, x: Reals, y: float) -> Reals:
 
 
 def _bed_points(slab: Slab) -> tuple[Reals, Reals]:
-    """Where the bed's pressure is sampled: middles of a grid twice as fine as the mesh."""
+    """Sampling points of the bed's pressure: centres of a grid twice as fine as the mesh."""
     return tuple(
         size * ((np.arange(2 * n) + 0.5) / (2 * n) - 0.5)
         for size, n in ((slab.length, slab.elements_x), (slab.width, slab.elements_y))
@@ -205,7 +205,7 @@ def _bed_points(slab: Slab) -> tuple[Reals, Reals]:
 
 
 def _factor(slab: Slab, voids: Sequence[MortarVoid], x: float, y: float) -> float:
-    """Bed factor at a place from the slab's centre."""
+    """Factor of the bed at a point from the slab's centre."""
     along = x + slab.length / 2.0
     inside = [v.factor for v in voids if v.x[0] <= along <= v.x[1] and v.y[0] <= y <= v.y[1]]
     return inside[0] if inside else 1.0

@@ -27,10 +27,10 @@ SEAT_POINTS = 5
 
 @dataclass(frozen=True, eq=False)
 class SeatTransform:
-    """Which seat frequency a mode folds to.
+    """Seat frequency to which each mode folds.
 
     Attributes:
-        seats: n.
+        seats: Number n of seats.
         target: Folded mode less one, shape (N,).
         sign: 1, -1, or 0 where the mode vanishes at every seat, times its mean over a seat's length, shape (N,).
     """
@@ -55,7 +55,7 @@ class SeatTransform:
 
     def to_seats(self, folded: Reals) -> Reals:
         """Sum over folded modes of a_i sin(i pi (j + 1/2)/n), shape (rows, n); ``folded`` is overwritten."""
-        folded[:, -1] *= 2.0  # the transform counts its last term once, the others twice
+        folded[:, -1] *= 2.0  # the transform counts its last term once and the others twice
         values: Reals = scipy.fft.dst(folded, type=3, axis=1, overwrite_x=True)
         values *= 0.5
         return values

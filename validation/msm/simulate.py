@@ -28,7 +28,7 @@ __all__ = ["FullLength", "load", "prepare", "run_full_length"]
 
 CHUNK_STEPS = 1000
 END_MARGIN = 10.0
-"""Wheels are compared while this far from the rail's ends [m]."""
+"""Least distance of a wheel from the rail's ends [m]."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class FullLength:
     """Numerics of the full-length model.
 
     Attributes:
-        length: Rail [m], taken to whole seats.
-        modes_per_metre: Trial functions a field and metre.
-        slab_modes: Free-free plate modes a slab.
+        length: Length of the rail [m], rounded to whole seats.
+        modes_per_metre: Trial functions per field and metre.
+        slab_modes: Free-free plate modes per slab.
         time_step: dt [s].
     """
 
@@ -59,17 +59,17 @@ def run_full_length(
     """Simulate a scenario with whole rails and all slabs.
 
     Args:
-        scenario: What runs over which track; its window and modes do not matter here.
+        scenario: Train and track; its window and modes are not used.
         numerics: Length, modes and step.
         output: HDF5 file; in memory if None.
         force: Replace an existing file.
-        progress: Called with simulated time and end time [s] now and then.
+        progress: Called from time to time with simulated time and end time [s].
 
     Returns:
         The result, open for reading; the run ends before a wheel comes within 10 m of the rail's end.
 
     Raises:
-        InputError: What the traditional model has not: changing speed, a start from zero, mortar that does not pull.
+        InputError: The scenario has a varying speed, a start from zero or mortar without tension.
     """
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     numerics = numerics or FullLength()
@@ -78,7 +78,7 @@ def run_full_length(
 
 
 def prepare(scenario: Scenario, numerics: FullLength, steps: int, wheel_rows: int, body_rows: int) -> FullStepper:
-    """Build the track, put the train into steady rolling, bind the kernels to buffers of so many steps and rows."""
+    """Build the track, start from steady rolling, and bind the kernels to buffers of the given steps and rows."""
     if not scenario.train.speed.is_constant:
         raise InputError("train.speed_kmh: must be one number in the full-length model")
     if scenario.numerics.start != "equilibrium":
@@ -96,8 +96,8 @@ def load(stepper: FullStepper, scenario: Scenario, irregularity: Irregularity, p
     """Fill the stepper's buffers for the coming steps.
 
     Args:
-        stepper: Says how many steps fit.
-        scenario: Gives the speed.
+        stepper: Owner of the buffers.
+        scenario: Source of the speed.
         irregularity: The track.
         position: Chainage of the first vehicle's centre now [m].
         end: Chainage where the run ends [m].
@@ -145,7 +145,7 @@ def _run(
 def _loop(
     scenario: Scenario, stepper: FullStepper, recorder: Recorder, writer: Writer, progress: Progress | None
 ) -> Result:
-    """March to the end of the way or of the rail."""
+    """Advance to the end of the distance or of the rail."""
     track, buffers, dt = stepper.track, stepper.buffers, stepper.track.newmark.dt
     front = float(track.train.wheelset_x.max())
     position = start = scenario.rear + scenario.centre_in_window
@@ -168,7 +168,7 @@ def _loop(
         if progress is not None:
             progress(done * dt, max(duration, done * dt))
     loop = time.perf_counter() - clock
-    return writer.close(
+    closed = writer.close(
         {
             "status": "complete",
             "simulated_time": done * dt,
@@ -178,10 +178,11 @@ def _loop(
             "real_time_factor": loop / (done * dt),
         }
     )
+    return Result.of(closed)
 
 
 def _samples(track: FullTrack, buffers: Buffers) -> Samples:
-    """The chunk as the recorder wants it; pressures with the slabs' dead weight."""
+    """Chunk in the recorder's form; pressures include the slabs' dead weight."""
     u, v = buffers.slabs[:, 0, :, : track.slab_modes], buffers.slabs[:, 1, :, : track.slab_modes]
     pressure = np.empty((*u.shape[:2], 2))
     for group in track.groups:

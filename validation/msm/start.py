@@ -1,12 +1,12 @@
-r"""Start of the full-length model: the engine's steady rolling, carried over to a rail that is fixed to the ground.
+r"""Start of the full-length model: the engine's steady rolling, transferred to a rail that is fixed to the ground.
 
-The equilibrium comes from the engine's own solver in a window long enough that its ends do not matter, with as many
-modes a metre. A field of the window that does not change in the moving frame is a travelling wave to the ground,
+The equilibrium comes from the engine's own solver in a window so long that its ends have no effect, with as many
+modes per metre. A field of the window that does not change in the moving frame is a travelling wave to the ground,
 
     q_i = (2/L) int W_i u ds,   q_i' = -V (2/L) int W_i u_s ds,   q_i'' = -V^2 k_i^2 q_i,
 
-W_i the full rail's modes. From rest instead of this velocity the rails would ring by 3 kN. Slabs lie still, pressed by
-the seats.
+W_i the full rail's modes. From rest instead of this velocity, the rails would vibrate by 3 kN. Slabs are at rest,
+loaded by the seats.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from validation.msm.step import FullState
 __all__ = ["steady_rolling"]
 
 MARGIN = 20.0
-"""Window beyond the outer wheels for the start [m]: exp(-20 m / 1 m) of the deflection is left at its ends."""
+"""Window beyond the outer wheels for the start [m]: the deflection at its ends is exp(-20 m / 1 m)."""
 SINE = (True, False, True, False, True)
 """Kind of the fields w, theta_y, v, theta_z, theta_x."""
 
@@ -38,9 +38,9 @@ def steady_rolling(track: FullTrack, state: FullState, scenario: Scenario, given
 
     Args:
         track: Constant data.
-        state: Written.
-        scenario: Says where the train stands at t = 0.
-        given: The engine's parts.
+        state: State to fill.
+        scenario: Source of the train's position at t = 0.
+        given: Parts of the engine.
         V: Speed [m/s].
     """
     length = float(np.ptp(given.train.wheelset_x)) + 2.0 * MARGIN
@@ -61,7 +61,7 @@ def _carry_rails(track: FullTrack, state: FullState, fields: Reals, length: floa
     """Project the window's fields, shape (2, 5, modes), onto the modes of the full rail."""
     modes = fields.shape[2]
     node, weight = np.polynomial.legendre.leggauss(8)
-    cell = length / (2 * modes)  # two cells a half wave of the shortest mode
+    cell = length / (2 * modes)  # two cells per half wave of the shortest mode
     s = (cell * (np.arange(2 * modes)[:, None] + 0.5 * (node + 1.0))).ravel()
     weights = np.tile(0.5 * cell * weight, 2 * modes) * 2.0 / track.rail_length
     kappa = np.arange(1, modes + 1) * np.pi / length
@@ -80,7 +80,7 @@ def _carry_rails(track: FullTrack, state: FullState, fields: Reals, length: floa
 
 
 def _press_slabs(track: FullTrack, state: FullState) -> None:
-    """Slabs in balance with what the rails pull at the seats."""
+    """Set the slabs in equilibrium with the rails' forces at the seats."""
     f, target, sign = track.fastening, track.transform.target, track.transform.sign
     base2, arm, m = track.half_base**2, track.rail.arm_fastening, track.slab_modes
     folded = np.zeros((6, track.transform.seats))

@@ -2,9 +2,9 @@ r"""One step of the full-length model: the engine's Newmark passes, on modes of 
 
     A a^{k+1} = -(C v~ + K u~) + f(u^k, v^k) + A_s a^k,    k = 0, 1 from a^0 = 0
 
-f are the seats, gravity, nonlinear suspension; contact is solved against the compliance of the step's end. A seat pulls
-a rail by the rail's and the slab's iterates and pushes the slab by the rail's iterate and the slab's predictor, since
-the slab's operator holds its own side of the seat.
+f contains seats, gravity, nonlinear suspension; contact is solved against the compliance at the step's end. The force
+of a seat on the rail uses the rail's and the slab's iterates, its force on the slab the rail's iterate and the slab's
+predictor, since the slab's operator contains its own side of the seat.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = ["Buffers", "FullState", "FullStepper"]
 
 @dataclass(eq=False)
 class FullState:
-    """What a step changes.
+    """Data that a step changes.
 
     Attributes:
         rails: Rows of modal coordinates, shape (rows, 10, N), see ``kernels``.
@@ -63,7 +63,7 @@ class FullState:
 
 @dataclass(frozen=True, eq=False)
 class Buffers:
-    """A chunk of steps.
+    """Inputs and records of a chunk of steps.
 
     Attributes:
         clock: Chainage of the first vehicle's centre, speed, its rate at the end of each step, shape (steps, N_CLOCK).
@@ -93,14 +93,14 @@ class Buffers:
 
 
 class FullStepper:
-    """Advances a state; binds the kernels to its arrays.
+    """Stepper of a state, with kernels bound to its arrays.
 
     Attributes:
-        seat_force: Vertical force, moment, lateral force of the seats on the slabs, shape (3, 2, slabs, seats a slab).
+        seat_force: Vertical force, moment, lateral force of the seats on slabs, shape (3, 2, slabs, seats per slab).
     """
 
     def __init__(self, track: FullTrack, state: FullState, buffers: Buffers, V: float) -> None:
-        """Bind, and factorise the vehicle at its constant speed V [m/s]."""
+        """Bind the kernels, and factorise the vehicle at its constant speed V [m/s]."""
         self.track, self.state, self.buffers = track, state, buffers
         self._tick = np.zeros(at.N_TICK, dtype=np.int32)
         seats = track.transform.seats
@@ -119,7 +119,7 @@ class FullStepper:
         self._bind()
 
     def _bind(self) -> None:
-        """Launch contexts of both kernels."""
+        """Bind the launches of both kernels."""
         track, state, buffers, train = self.track, self.state, self.buffers, self.track.train
         W, modes = len(track.wheel), track.modes
         dof = train.wheelset_dof
@@ -149,7 +149,7 @@ class FullStepper:
         )  # fmt: skip
 
     def step(self, i: int, wheel_row: int = -1, body_row: int = -1) -> None:
-        """Advance to the end of step ``i`` of the chunk; rows of the records to fill, -1 none."""
+        """Advance to the end of step ``i`` of the chunk; with the rows of the records to fill, -1 for none."""
         tick, last = self._tick, self.track.passes - 1
         tick[at.STEP], tick[at.WHEEL_RECORD] = i, wheel_row
         self._predict_slabs()
@@ -165,7 +165,7 @@ class FullStepper:
             self.buffers.body[0, body_row] = self.state.motion[: at.A + 1, : self.buffers.body.shape[-1]]
 
     def _predict_slabs(self) -> None:
-        """Predictors of the slabs and -(C v + K u) at them."""
+        """Compute the predictors of the slabs and -(C v + K u) at them."""
         (u, v, a), newmark = self.state.slabs, self.track.newmark
         up, vp = self._predicted
         up[:] = u + newmark.dt * v + (0.5 - newmark.beta) * newmark.dt**2 * a
@@ -176,7 +176,7 @@ class FullStepper:
             self._linear[k] = -(up[k] @ group.slab.stiffness + vp[k] @ group.slab.damping)
 
     def _seats(self, *, first: bool) -> None:
-        """Forces of all seats, to the rails' folded modes and to the slabs."""
+        """Compute the forces of all seats on the rails' folded modes and on the slabs."""
         track = self.track
         slabs, per_slab = track.seat_scale.shape[1:]
         pull = np.zeros((6, slabs * per_slab))
@@ -191,7 +191,7 @@ class FullStepper:
         self._scattered[:] = track.transform.from_seats(flat)
 
     def _slab_pull(self, u: Reals, v: Reals) -> Reals:
-        """What the slabs' motion takes from vertical force, moment and lateral force of the seats, (3, 2, slabs, 9)."""
+        """Vertical force, moment and lateral force of the seats due to the slabs' motion, shape (3, 2, slabs, 9)."""
         track, m = self.track, self.track.slab_modes
         numbers = track.numbers
         plate = numbers[KV] * u[:, :m] + numbers[CV] * v[:, :m]
@@ -210,7 +210,7 @@ class FullStepper:
         push[:, m:] = force[2].sum(axis=0) @ self._lateral.T
 
     def _solve_slabs(self) -> None:
-        """Accelerations of the slabs, and their correctors."""
+        """Compute the accelerations of the slabs, and apply their correctors."""
         (u, v, a), newmark = self.state.slabs, self.track.newmark
         load = self._linear + self._push
         for group in self.track.groups:

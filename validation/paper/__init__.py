@@ -1,1 +1,1 @@
-"""The paper's case: moving window beside the traditional full-length model."""
+"""The paper's case: moving window against the traditional full-length model."""

@@ -1,7 +1,7 @@
 """The paper's case: 600 m at 350 km/h, window of 36 m, 60 modes, German low disturbance.
 
 References: the source paper's degrees of freedom; statistics of an independent NumPy prototype of the
-same equations with the same parts (another realisation of the same spectrum), digits as noted there.
+same equations with the same parts (another realisation of the same spectrum), with the digits noted there.
 Statistics leave out the first 50 m.
 """
 
@@ -55,7 +55,7 @@ CASES = (
         source="static wheel load of CRH380A v2",
         reference=68.7,
         rtol=0.01,
-        why="mean over 5.7 s of a car that bounces at 0.7 Hz",
+        why="mean over 5.7 s, while the car bounces at 0.7 Hz",
         compute=lambda: _kilonewton(_paper().vertical).mean(),
     ),
     Case(
@@ -65,7 +65,7 @@ CASES = (
         source=PROTOTYPE,
         reference=(1.35, 0.37),
         atol=0.03,
-        why="printed digits; moves with the smoothing of the contact table",
+        why="printed digits; depends on the smoothing of the contact table",
         compute=_at_rest,
     ),
     Case(
@@ -83,7 +83,7 @@ CASES = (
     Case(
         name="paper-lift-off",
         kind="information",
-        quantity="share of time that a wheel is off the rail [%]; prototype: a wheel now and then",
+        quantity="share of time in which a wheel is off the rail [%]; prototype: occasionally",
         source=PROTOTYPE,
         reference=np.nan,
         why="depends on the realisation",
@@ -94,7 +94,7 @@ CASES = (
             name=f"paper-dofs-{count}",
             kind="information",
             quantity=f"degrees of freedom, {words}",
-            source="the source paper; its 44 DOFs a slab cannot be had from 18 standard plate elements",
+            source="the source paper; its 44 DOFs per slab do not follow from 18 standard plate elements",
             reference=943,
             why="35 + 2 x 5 x 60 + slabs x (3 x 30 nodes + lateral and yaw)",
             compute=lambda count=count: paper_model(f'numerics.slab_count="{count}"').ingredients.dof_counts["total"],
@@ -107,7 +107,7 @@ CASES = (
         quantity=("wall time of the loop over simulated time: pre-bound launches (600 m), public ones (50 m)"),
         source="-",
         reference=(np.nan, np.nan),
-        why="on the machine that wrote this table; compilation and set-up apart",
+        why="on the machine that wrote this table; without compilation and set-up",
         compute=lambda: [
             _paper().facts["real_time_factor"],
             simulate("paper", "train.distance=50.0", public=True).facts["real_time_factor"],

@@ -1,16 +1,16 @@
-"""The moving window beside the traditional full-length model, over the same 600 m of track.
+"""The moving window against the traditional full-length model, over the same 600 m of track.
 
 Both run the scenario ``paper`` from chainage 30 m. Relative difference: the largest absolute difference of a force
 over all wheels and times, over the largest force of the full-length model. The rms difference over the standard
-deviation goes beside it, since a single blow after a wheel's flight decides the largest one.
+deviation is given as well, since a single impact after a wheel lift determines the largest one.
 
-The time step is 2.5e-5 s here: at 2e-4 s the two programs' own step errors at such a blow, not the window, are what
-one would compare. With pinned ends the largest difference at 36 m is an echo of the blow: it comes to the leading wheel
-4.7 and 7.9 ms after landing, and 16 m there and back at the speed of shear sqrt(kappa G / rho) = 2030 m/s take 7.9 ms.
-The 36 m window is therefore judged with its absorbing zones, and its pinned ends listed beside.
+The time step is 2.5e-5 s here: at 2e-4 s one would compare the step errors of both programs at such an impact, not the
+window. With pinned ends the largest difference at 36 m is an echo of the impact: it reaches the leading wheel 4.7 and
+7.9 ms after landing, and 16 m there and back at the shear wave speed sqrt(kappa G / rho) = 2030 m/s take 7.9 ms. The
+36 m window is therefore judged with its absorbing zones, and its pinned ends are listed for information.
 
 Slabs of the full-length model have all modes of the engine's mesh where the rails are to be compared, and 20 modes
-where it is the traditional one.
+where the traditional model is meant.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from validation.msm.simulate import FullLength
 __all__ = ["ABSORBING", "ALL_MODES", "CASES", "Difference", "difference", "full", "window"]
 
 STEP, COARSE_STEP = 2.5e-5, 2e-4
-ALL_MODES, TRADITIONAL_MODES = 90, 20  # of a slab: its mesh has 90
+ALL_MODES, TRADITIONAL_MODES = 90, 20  # modes of a slab, whose mesh has 90
 PER_METRE = 2.0
 LENGTHS = (24, 36, 48, 60)
 SAME_WAY = ("train.start=30", "train.distance=600")
 ABSORBING = "numerics.absorbing_zone=6.0"
-SOURCE = "traditional model, 661.5 m of rail, 2 modes a metre, slabs with all modes of the mesh"
+SOURCE = "traditional model, 661.5 m of rail, 2 modes per metre, slabs with all modes of the mesh"
 
 
 class Difference(NamedTuple):
-    """Of two runs, in one direction: largest over the peak, rms over the standard deviation [%]."""
+    """Differences of two runs in one direction: largest over the peak, rms over the standard deviation [%]."""
 
     largest: float
     rms: float
@@ -44,7 +44,7 @@ class Difference(NamedTuple):
 def window(
     length: float, per_metre: float = PER_METRE, truncation: str = "none", step: float = STEP, *overrides: str
 ) -> Forces:
-    """The paper's case in a window of the given length [m] and modes a metre."""
+    """The paper's case in a window of the given length [m] and modes per metre."""
     return simulate("paper", *_settings(step), *(_windowed(length, per_metre, truncation)), *overrides)
 
 
@@ -69,10 +69,10 @@ def _windowed(length: float, per_metre: float, truncation: str) -> tuple[str, ..
 
 
 def difference(reference: Forces, other: Forces, direction: str, wheelset: int | None = None) -> Difference:
-    """Compare two runs over the way that both have done.
+    """Compare two runs over their common distance.
 
     Args:
-        reference: Gives peak and standard deviation.
+        reference: Run that defines peak and standard deviation.
         other: Sampled at the same times.
         direction: ``"vertical"`` or ``"lateral"``.
         wheelset: One wheelset only, 0 the leading one.
@@ -99,11 +99,11 @@ CASES = (
         Case(
             name=f"equal-density-short-{direction}",
             kind="full length",
-            quantity=f"{direction} forces over 15 m, 36 m window less 60 m of rail, largest difference over peak [%]",
-            source="traditional model, 60 m of rail, 2 modes a metre, slabs with all modes of the mesh",
+            quantity=f"{direction} forces over 15 m, 36 m window minus 60 m of rail, largest difference over peak [%]",
+            source="traditional model, 60 m of rail, 2 modes per metre, slabs with all modes of the mesh",
             reference=0.2,
             rule="at most",
-            why="what the window's ends may change; no wheel lifts off here",
+            why="allowed effect of the window's ends; no wheel lifts off here",
             compute=lambda direction=direction: _short(direction),
         )
         for direction in ("vertical", "lateral")
@@ -113,11 +113,11 @@ CASES = (
             name=f"equal-density-{length}-{direction}",
             kind="full length",
             quantity=f"{direction} forces over 600 m, {length} m window{', absorbing zones of 6 m' * bool(ends)},"
-            " 2 modes a metre, largest difference over peak [%]",
+            " 2 modes per metre, largest difference over peak [%]",
             source=SOURCE,
             reference=bound,
             rule="at most",
-            why="expected of two independent programs",
+            why="expected agreement of two independent programs",
             compute=lambda length=length, direction=direction, ends=ends: (
                 difference(full(), window(length, PER_METRE, "none", STEP, *ends), direction).largest
             ),
@@ -135,7 +135,7 @@ CASES = (
         quantity="the same with the pinned ends of the plain 36 m window, vertical and lateral [%]",
         source=SOURCE,
         reference=(np.nan, np.nan),
-        why="what the absorbing zones are for: an echo of the blow that ends a wheel's flight",
+        why="effect removed by the absorbing zones: an echo of the impact of a landing wheel",
         compute=lambda: [difference(full(), window(36), direction).largest for direction in ("vertical", "lateral")],
         quick=False,
     ),
@@ -146,7 +146,7 @@ CASES = (
             quantity=f"{direction} forces, windows of 24, 36, 48, 60 m, rms difference over standard deviation [%]",
             source=SOURCE,
             reference=(np.nan,) * len(LENGTHS),
-            why="the trend: what a longer window buys",
+            why="the effect of a longer window",
             compute=lambda direction=direction: [
                 difference(full(), window(length), direction).rms for length in LENGTHS
             ],
@@ -160,9 +160,9 @@ CASES = (
             kind="information",
             quantity=f"{direction} forces, slabs by 20 modes instead of 90: largest over peak, rms over standard"
             " deviation [%]",
-            source="traditional model against itself; 0.4 % measured by another program",
+            source="traditional model against itself; 0.4 % by another program",
             reference=(np.nan, np.nan),
-            why="why the rails are compared on equal slabs",
+            why="the reason for comparing the rails on equal slabs",
             compute=lambda direction=direction: difference(full(), full(TRADITIONAL_MODES, length=600.0), direction),
             quick=False,
         )

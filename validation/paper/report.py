@@ -33,7 +33,7 @@ from validation.paper.comparison import (
 __all__ = ["write"]
 
 PAPER_MODES = 60 / 36
-LEFT, RIGHT, MARK = "#0072B2", "#D55E00", "#555555"  # Okabe and Ito: told apart by any eye
+LEFT, RIGHT, MARK = "#0072B2", "#D55E00", "#555555"  # Okabe-Ito palette, distinct for colour-blind readers
 DIRECTIONS = ("vertical", "lateral")
 PAPER = {"window": (943, 42_261.0), "full": (16_427, 88_532.0)}
 PAPER_DIFFERENCE = 3.8
@@ -43,7 +43,7 @@ def write(folder: Path) -> Path:
     """Run both models, compare, draw.
 
     Args:
-        folder: Where the page and its pictures go.
+        folder: Folder of the page and its figures.
 
     Returns:
         The page.
@@ -51,7 +51,7 @@ def write(folder: Path) -> Path:
     backend.start(1)
     folder.mkdir(parents=True, exist_ok=True)
     runs = _runs()
-    reference, ours = runs["full, 90 modes a slab"], runs["window 36 m, 60 modes"]
+    reference, ours = runs["full, 90 modes per slab"], runs["window 36 m, 60 modes"]
     for direction, number in zip(DIRECTIONS, (2, 3), strict=True):
         _draw_forces(folder / f"paper_{direction}.png", reference, ours, direction, number)
     _draw_windows(folder / "paper_windows.png", reference)
@@ -61,13 +61,13 @@ def write(folder: Path) -> Path:
 
 
 def _runs() -> dict[str, Forces]:
-    """Every run of the page; each is made once a session."""
+    """All runs of the page; each is made once per session."""
     plan: dict[str, Callable[[], Forces]] = {
         "window 36 m, 60 modes, 7 slabs, 2e-4 s": lambda: window(36, PAPER_MODES, "none", COARSE_STEP, *SEVEN_SLABS),
-        "full 600 m, 20 modes a slab, 2e-4 s": lambda: full(TRADITIONAL_MODES, step=COARSE_STEP, length=600.0),
-        "full, 90 modes a slab": full,
-        "full, 90 modes a slab, local": lambda: full(truncation="local"),
-        "full 600 m, 20 modes a slab": lambda: full(TRADITIONAL_MODES, length=600.0),
+        "full 600 m, 20 modes per slab, 2e-4 s": lambda: full(TRADITIONAL_MODES, step=COARSE_STEP, length=600.0),
+        "full, 90 modes per slab": full,
+        "full, 90 modes per slab, local": lambda: full(truncation="local"),
+        "full 600 m, 20 modes per slab": lambda: full(TRADITIONAL_MODES, length=600.0),
         "window 36 m, 60 modes": lambda: window(36, PAPER_MODES),
         "window 36 m, 60 modes, local": lambda: window(36, PAPER_MODES, "local"),
         "window 36 m, 60 modes, 7 slabs": lambda: window(36, PAPER_MODES, "none", STEP, *SEVEN_SLABS),
@@ -90,7 +90,7 @@ SEVEN_SLABS = ('numerics.slab_count="paper"',)
 
 
 def _draw_forces(path: Path, reference: Forces, ours: Forces, direction: str, number: int) -> None:
-    """The paper's Fig. 2 or 3: forces of wheelset 1, left and right, both models, and their difference."""
+    """Draw the paper's Fig. 2 or 3: forces of wheelset 1, left and right, both models, and their difference."""
     n = min(len(reference.time), len(ours.time))
     way = reference.position[:n] - reference.position[0]
     figure, axes = plt.subplots(4, 1, figsize=(9.0, 9.0), sharex=True, layout="constrained")
@@ -121,7 +121,7 @@ def _draw_forces(path: Path, reference: Forces, ours: Forces, direction: str, nu
 
 
 def _draw_windows(path: Path, reference: Forces) -> None:
-    """Difference against the window's length, two modes a metre."""
+    """Draw the difference over the window's length, two modes per metre."""
     figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.6), sharey=True, layout="constrained")
     for axis, direction, colour in zip(axes, DIRECTIONS, (LEFT, RIGHT), strict=True):
         found = [difference(reference, window(length), direction) for length in LENGTHS]
@@ -143,16 +143,16 @@ def _draw_windows(path: Path, reference: Forces) -> None:
 def _page(runs: dict[str, Forces]) -> str:
     return "\n".join(
         [
-            "# The paper's case: moving window beside full length",
+            "# The paper's case: moving window against full length",
             "",
             "One vehicle (CRH380A), 600 m of slab track (CRTS III) at 350 km/h, German low disturbance, seed 1; both"
-            " models feel the same track, from chainage 30 m on. `python -m validation paper` wrote this page"
+            " models run over the same track, from chainage 30 m on. `python -m validation paper` wrote this page"
             f" (Python {platform.python_version()}).",
             "",
             "*Relative difference*: largest absolute difference over all wheels and all times of the 600 m, over the"
             " largest force of the full-length model; in brackets the root mean square difference over the standard"
-            f" deviation of the force. Time step {STEP:g} s unless said: at {COARSE_STEP:g} s the blow that ends a"
-            " wheel's flight is wrong by some per cent of the peak in either program, which is no fault of the window.",
+            f" deviation of the force. Time step {STEP:g} s unless stated: at {COARSE_STEP:g} s the impact of a"
+            " landing wheel has an error of some per cent of the peak in either program, independent of the window.",
             "",
             *_against_paper(runs),
             *_modes(runs),
@@ -167,17 +167,17 @@ def _page(runs: dict[str, Forces]) -> str:
 
 
 def _against_paper(runs: dict[str, Forces]) -> list[str]:
-    """DOFs, run times and differences beside the paper's."""
+    """Table of DOFs, run times and differences, with the paper's."""
     ours, coarse = runs["window 36 m, 60 modes, 7 slabs"], runs["window 36 m, 60 modes, 7 slabs, 2e-4 s"]
-    traditional = runs["full 600 m, 20 modes a slab"]
-    slow = runs["full 600 m, 20 modes a slab, 2e-4 s"]
+    traditional = runs["full 600 m, 20 modes per slab"]
+    slow = runs["full 600 m, 20 modes per slab, 2e-4 s"]
     found = {d: difference(traditional, ours, d) for d in DIRECTIONS}
     leading = {d: difference(traditional, ours, d, wheelset=0) for d in DIRECTIONS}
     speed_up = slow.facts["real_time_factor"] / coarse.facts["real_time_factor"]
     return [
-        "## The paper's settings: 36 m, 60 modes, 7 slabs; 600 m of rail, 1200 modes, 20 modes a slab",
+        "## The paper's settings: 36 m, 60 modes, 7 slabs; 600 m of rail, 1200 modes, 20 modes per slab",
         "",
-        "| | paper | ours |",
+        "| | paper | tiengine |",
         "| --- | --- | --- |",
         f"| degrees of freedom, window | {PAPER['window'][0]} | {ours.facts['dofs']} |",
         f"| degrees of freedom, full length | {PAPER['full'][0]} | {traditional.facts['dofs']} |",
@@ -190,29 +190,30 @@ def _against_paper(runs: dict[str, Forces]) -> list[str]:
         f"| relative difference, wheelset 1 | {PAPER_DIFFERENCE} % | {_text(leading['vertical'])} vertical,"
         f" {_text(leading['lateral'])} lateral |",
         "",
-        f"Run times are of the time loop, step {COARSE_STEP:g} s, two passes, one core of this machine; the paper's are"
+        f"Run times are of the time loop, step {COARSE_STEP:g} s, two passes, one core of this machine; those of the"
+        f" paper are"
         " of MATLAB's ode15s on a Xeon W-2115. Its counts are 35 + 2 x 5 x 60 + 7 x 44 and"
-        " 35 + 2 x 5 x 1200 + 122 x 36; 44 degrees of freedom a slab and 122 slabs do not follow from its text (18"
+        " 35 + 2 x 5 x 1200 + 122 x 36; 44 degrees of freedom per slab and 122 slabs do not follow from its text (18"
         " plate elements have 90, and slabs of 5.67 m are 106 on 600 m). The rail is a whole number of seats long,"
         f" {traditional.facts['rail_length']:.2f} m; wheels keep 10 m from its ends,"
-        f" which leaves {traditional.position[-1] - traditional.position[0]:.0f} m of way.",
+        f" which leaves a distance of {traditional.position[-1] - traditional.position[0]:.0f} m.",
         "",
     ]
 
 
 def _modes(runs: dict[str, Forces]) -> list[str]:
-    """60 and 72 modes, with and without the truncation correction, against 2 modes a metre in full length."""
+    """60 and 72 modes, with and without the truncation correction, against 2 modes per metre in full length."""
     rows = []
     for modes in (60, 72):
         for correction in ("", ", local"):
-            reference = runs[f"full, 90 modes a slab{correction}"]
+            reference = runs[f"full, 90 modes per slab{correction}"]
             found = [difference(reference, runs[f"window 36 m, {modes} modes{correction}"], d) for d in DIRECTIONS]
             rows.append(f"| {modes} | {'local' if correction else 'none'} | {_text(found[0])} | {_text(found[1])} |")
     return [
-        "## 60 and 72 modes in 36 m against 2 modes a metre of 661.5 m",
+        "## 60 and 72 modes in 36 m against 2 modes per metre of 661.5 m",
         "",
-        "72 modes are as many a metre as the full length has; slabs have the same 90 shapes in both. With the"
-        " truncation correction both models lend their wheels the static compliance of the modes they leave out.",
+        "72 modes are as many per metre as in the full length; slabs have the same 90 modes in both. With the"
+        " truncation correction both models add the static compliance of their omitted modes under the wheels.",
         "",
         "| modes in 36 m | correction, both | vertical | lateral |",
         "| --- | --- | --- | --- |",
@@ -222,8 +223,8 @@ def _modes(runs: dict[str, Forces]) -> list[str]:
 
 
 def _windows(runs: dict[str, Forces]) -> list[str]:
-    """Length of the window against difference."""
-    reference = runs["full, 90 modes a slab"]
+    """Difference over the length of the window."""
+    reference = runs["full, 90 modes per slab"]
     found = {f"{length} m": window(length) for length in LENGTHS}
     found["36 m, absorbing zones of 6 m"] = runs["window 36 m, absorbing"]
     rows = [
@@ -231,15 +232,15 @@ def _windows(runs: dict[str, Forces]) -> list[str]:
         for name, run in found.items()
     ]
     return [
-        "## Length of the window, 2 modes a metre",
+        "## Length of the window, 2 modes per metre",
         "",
         "| window | vertical | lateral |",
         "| --- | --- | --- |",
         *rows,
         "",
-        "With 36 m the largest vertical difference is an echo: the blow that ends the leading wheel's flight comes back"
-        " from the window's pinned end 8 m ahead, 7.9 ms later, the time that 16 m take at the speed of shear"
-        " (2030 m/s). `numerics.absorbing_zone` swallows it.",
+        "With 36 m the largest vertical difference is an echo: the impact of the landing leading wheel returns"
+        " from the window's pinned end 8 m ahead 7.9 ms later, the time for 16 m at the shear wave speed"
+        " (2030 m/s). `numerics.absorbing_zone` absorbs it.",
         "",
         "![window length](paper_windows.png)",
         "",
@@ -247,13 +248,13 @@ def _windows(runs: dict[str, Forces]) -> list[str]:
 
 
 def _slabs(runs: dict[str, Forces]) -> list[str]:
-    reference, traditional = runs["full, 90 modes a slab"], runs["full 600 m, 20 modes a slab"]
+    reference, traditional = runs["full, 90 modes per slab"], runs["full 600 m, 20 modes per slab"]
     found = [_text(difference(reference, traditional, d)) for d in DIRECTIONS]
     return [
         "## Slabs by 20 modes instead of their mesh",
         "",
-        f"The full-length model against itself: {found[0]} vertical, {found[1]} lateral. A seat presses on a spot that"
-        " 20 modes cannot follow, so the traditional slab is a little too stiff there.",
+        f"The full-length model against itself: {found[0]} vertical, {found[1]} lateral. 20 modes cannot represent the"
+        " local deflection at a seat, so that the traditional slab is slightly too stiff there.",
         "",
     ]
 

@@ -1,1 +1,1 @@
-"""Speed: cases as data (``cases.toml``), one command that runs them: ``python -m validation.speed``."""
+"""Speed measurements: cases as data (``cases.toml``), run by ``python -m validation.speed``."""

@@ -1,4 +1,4 @@
-"""Command line: ``python -m validation.speed``."""
+"""Command line ``python -m validation.speed``."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ Tell = Callable[[str], object]
 
 @dataclass(frozen=True)
 class Case:
-    """Something to measure.
+    """A measurement.
 
     Attributes:
-        runs: Of ``cases.toml``, that all cases together take in turn.
-        measure: Findings from how much to measure, these runs, and a call that says what goes on.
+        runs: Runs of ``cases.toml`` that the case compares in turn.
+        measure: Function of the effort, these runs and a callback for progress that returns the findings.
     """
 
     runs: tuple[str, ...]
@@ -56,14 +56,14 @@ CASES = {
 
 
 @click.command()
-@click.option("--quick", is_flag=True, help="Some four minutes: fewer repeats, less distance.")
-@click.option("--long", "far", is_flag=True, help="A run of 100 km besides.")
-@click.option("--only", multiple=True, type=click.Choice(tuple(CASES)), help="Only this case; may be repeated.")
-@click.option("--draw", is_flag=True, help="Measure nothing; table, page and figures from the file as it is.")
+@click.option("--quick", is_flag=True, help="Measure in about four minutes: fewer repeats, shorter distances.")
+@click.option("--long", "far", is_flag=True, help="Measure a run of 100 km as well.")
+@click.option("--only", multiple=True, type=click.Choice(tuple(CASES)), help="Measure only this case; may be repeated.")
+@click.option("--draw", is_flag=True, help="Measure nothing; make table, page and figures from the kept findings.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), default=REPORT, help="Folder of the report.")
 def main(quick: bool, far: bool, only: tuple[str, ...], draw: bool, output: Path) -> None:
-    """Measure the engine's speed; cases not chosen keep what was found before."""
-    from validation.speed.figures import draw as draw_figures  # here: the processes that measure do not need it
+    """Measure the engine's speed; cases not chosen keep their earlier findings."""
+    from validation.speed.figures import draw as draw_figures  # imports matplotlib
 
     console = Console(highlight=False)
     if not console.is_terminal:
@@ -84,7 +84,7 @@ def main(quick: bool, far: bool, only: tuple[str, ...], draw: bool, output: Path
 
 
 def _measure(chosen: Sequence[str], much: Effort, console: Console) -> dict[str, dict[str, object]]:
-    """Circumstances and findings of the chosen cases."""
+    """Measure the chosen cases; return their circumstances and findings."""
     date = time.strftime("%Y-%m-%d %H:%M")
     start = findings.circumstances(much.name, date)
     clock = time.perf_counter()

@@ -84,6 +84,6 @@ class Bench:
 
 
 def timed_in_turn(benches: Sequence[Bench], rounds: int, steps: int) -> list[float]:
-    """Wall time of a step of each [us], medians over rounds in which all take a block in turn."""
+    """Wall time of a step of each bench [us], medians over rounds in which each runs a block in turn."""
     spent = [[bench.block_us(steps) for bench in benches] for _ in range(rounds)]
     return [float(x) for x in np.median(spent, axis=0)]

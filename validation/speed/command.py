@@ -1,4 +1,4 @@
-"""The whole command ``tiengine run paper`` as its user waits for it: caches warm, and empty."""
+"""Wall time of the whole command ``tiengine run paper``, with warm and with empty caches."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from tiengine import result as results
-from tiengine.contact import table_cache as contact_cache
+from tiengine.parameters.cache_folders import TABLES
 from validation.speed.effort import Effort
 from validation.speed.findings import Findings
 from validation.speed.runs import CASES, Facts, median_of
@@ -19,15 +19,15 @@ from validation.speed.runs import CASES, Facts, median_of
 __all__ = ["command"]
 
 PARTS = ("import", "jit", "setup", "loop", "writing")
-ENTRY = "from tiengine.cli import main; main()"  # what the installed script does, wherever it is installed
+ENTRY = "from tiengine.cli.commands import main; main()"  # what the installed script does, wherever it is installed
 CACHE = "TI_OFFLINE_CACHE_FILE_PATH"  # Taichi's own variable for the folder of its cache
 
 
 def command(effort: Effort) -> Findings:
-    """Run it once with an empty cache, then with a warm one, several times; 600 m each."""
+    """Run the command once with an empty cache, then several times with a warm one; 600 m each."""
     with TemporaryDirectory(prefix="tiengine-speed-") as folder:
         cache = Path(folder) / "cache"
-        cold = [once(Path(folder), cache)]  # which fills it
+        cold = [once(Path(folder), cache)]  # fills the cache
         warm = [once(Path(folder), cache) for _ in range(effort.commands)]
     values: dict[str, Any] = {"warm_s": median_of(warm, "wall"), "cold_s": median_of(cold, "wall")}
     for name, facts in (("warm", warm), ("cold", cold)):
@@ -38,21 +38,21 @@ def command(effort: Effort) -> Findings:
 
 
 def once(folder: Path, cache: Path, *settings: str) -> Facts:
-    """One run of the command.
+    """Run the command once.
 
     Args:
-        folder: For the result.
+        folder: Folder of the result.
         cache: Folder of both caches, Taichi's and that of contact tables.
         settings: Further ``KEY=VALUE``.
 
     Returns:
-        Attributes of the result, and ``wall``, of the whole process [s].
+        Attributes of the result, and ``wall``, the wall time of the whole process [s].
     """
     path = folder / "paper.h5"
     common = (f"{key}={_toml(value)}" for key, value in CASES["common"].items())
     chosen = [word for each in (*common, *settings) for word in ("--set", each)]
     words = [sys.executable, "-c", ENTRY, "run", "paper", "--quiet", "--force", "-o", str(path), *chosen]
-    environment = os.environ | {CACHE: str(cache), contact_cache.FOLDER: str(cache / "contact")}
+    environment = os.environ | {CACHE: str(cache), TABLES: str(cache / "contact")}
     clock = time.perf_counter()
     subprocess.run(words, check=True, env=environment)
     wall = time.perf_counter() - clock
@@ -61,5 +61,5 @@ def once(folder: Path, cache: Path, *settings: str) -> Facts:
 
 
 def _toml(value: Any) -> str:
-    """A value as ``--set`` takes it."""
+    """Text of a value for ``--set``."""
     return str(value).replace("'", '"') if isinstance(value, list) else str(value)

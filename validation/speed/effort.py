@@ -1,4 +1,4 @@
-"""How much is measured: quickly or well."""
+"""Repeats and sizes of the measurements."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ class Effort:
     """Repeats and sizes.
 
     Attributes:
-        name: What the report calls it.
-        rounds: Repeats of each run.
-        distance: Way of each run [m].
+        name: Name in the report.
+        rounds: Number of repeats of each run.
+        distance: Distance of each run [m].
         commands: Repeats of the whole command with a warm cache; the cold one is run once.
-        lengths_km: Ways to compare, each in a process of its own [km].
+        lengths_km: Distances to compare, each in a process of its own [km].
         bench_rounds: Repeats of a block of steps in scaling curves.
         bench_steps: Steps in a block.
         profile_steps: Steps of a profile.
@@ -33,11 +33,11 @@ class Effort:
 
 
 def effort(quick: bool, far: bool) -> Effort:
-    """Choose.
+    """Choose an effort.
 
     Args:
-        quick: Some four minutes.
-        far: 100 km besides.
+        quick: Whether to measure in about four minutes.
+        far: Whether to measure 100 km as well.
     """
     if quick:
         return Effort("quick", 2, 20.0, 1, (0.25, 0.5, 1.0), 3, 60, 1000)

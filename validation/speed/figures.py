@@ -1,4 +1,4 @@
-"""Figures of the report, drawn from what the JSON file keeps."""
+"""Figures of the report, drawn from the kept findings."""
 
 from __future__ import annotations
 
@@ -17,21 +17,26 @@ import numpy as np
 __all__ = ["draw"]
 
 PUBLISHED = tomllib.loads((Path(__file__).parent / "published.toml").read_text(encoding="utf-8"))
-OURS, FULL, OTHERS, BEST = "#0072B2", "#56B4E9", "#999999", "#D55E00"  # of Okabe and Ito, told apart by any eye
+OURS, FULL, OTHERS, BEST = (
+    "#0072B2",
+    "#56B4E9",
+    "#999999",
+    "#D55E00",
+)  # Okabe-Ito palette, distinct for colour-blind readers
 STAGE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
 
-LEFT = 0.01  # where bars begin
+LEFT = 0.01  # start of the bars
 TICKS = [tick * 10**decade for decade in (1, 2, 3) for tick in (1, 1.5, 2, 3, 5, 7)]
 
 Cases = Mapping[str, Any]
 
 
 def draw(cases: Cases, folder: Path) -> list[str]:
-    """Draw what can be drawn from the cases that were measured.
+    """Draw the figures of all cases that were measured.
 
     Args:
         cases: Findings by case.
-        folder: Where the pictures go.
+        folder: Folder of the figures.
 
     Returns:
         Names of the files.
@@ -51,7 +56,7 @@ def draw(cases: Cases, folder: Path) -> list[str]:
 
 
 def _factors(cases: Cases) -> Any:
-    """Real-time factors, ours and others', on a logarithmic axis."""
+    """Draw real-time factors of tiengine and of published programs on a logarithmic axis."""
     bars = list(_bars(cases))
     figure, axis = plt.subplots(figsize=(9.5, 0.55 * len(bars) + 1.3), layout="constrained")
     for i, (label, source, low, high, colour) in enumerate(bars):
@@ -91,7 +96,7 @@ def _bars(cases: Cases) -> Any:
         values = cases["full_length"]["values"]
         for modes in (90, 20):
             rtf = values[f"rtf_{modes}"]
-            yield f"our full-length model, 600 m, {modes} modes a slab", here, rtf, rtf, FULL
+            yield f"our full-length model, 600 m, {modes} modes per slab", here, rtf, rtf, FULL
     one = cases["one_train"]["values"]
     yield "tiengine, default numerics, one train", here, one["rtf_default"], one["rtf_default"], OURS
     yield "tiengine, the paper's case, one train", here, one["rtf"], one["rtf"], OURS
@@ -101,7 +106,7 @@ def _bars(cases: Cases) -> Any:
 
 
 def _scaling(cases: Cases) -> Any:
-    """Cost of a step over everything that can be varied."""
+    """Draw the cost of a step over everything that was varied."""
     data = cases["scaling"]["data"]
     panels = {name: axis for name, axis in data.items() if name != "outputs"}
     outputs = data["outputs"]
@@ -121,7 +126,7 @@ def _scaling(cases: Cases) -> Any:
         low, high = us.min() / 1.5, us.max() * 1.5
         ticks = [tick for tick in TICKS if low < tick < high]
         axis.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
-        axis.set(xlabel=found["words"], ylabel=f"us a {found['unit']}", ylim=(low, high))
+        axis.set(xlabel=found["words"], ylabel=f"µs per {found['unit']}", ylim=(low, high))
         if "shares_last" in found:
             shares = list(found["shares_last"].items())[:2]
             text = "at the last point:\n" + "\n".join(f"{stage} {share:.0%}" for stage, share in shares)
@@ -137,7 +142,7 @@ def _scaling(cases: Cases) -> Any:
 
 
 def _roofline(cases: Cases) -> Any:
-    """Rates of the products of each stage over their intensity, under the machine's roofs."""
+    """Draw the rates of the products of each stage over their intensity, with the machine's roofline."""
     data = cases["roofline"]["data"]
     roofs = data["one"]["roofs"]
     figure, axis = plt.subplots(figsize=(8.5, 5.2), layout="constrained")
@@ -165,7 +170,7 @@ def _roofline(cases: Cases) -> Any:
 
 
 def _points(axis: Any, data: Mapping[str, Any]) -> None:
-    """One colour a stage; hollow for one train, filled for many."""
+    """Draw one colour per stage, hollow for one train, filled for many."""
     stages: Sequence[str] = [rate["stage"] for rate in data["one"]["rates"]]
     for name, mark in (("one", "o"), ("many", "s")):
         trains = data[name]["trains"]

@@ -1,4 +1,4 @@
-"""What the cases found, kept as JSON from one run to the next, and held to the targets."""
+"""Findings of the cases, kept as JSON from one run to the next, and compared with the targets."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from validation.speed.runs import CASES
 __all__ = ["Circumstances", "Findings", "Row", "circumstances", "read", "rows", "write"]
 
 FORMAT, FORMAT_VERSION = "tiengine-speed", 1
-BUSY = 0.25  # of a core, by others: an A/B comparison still holds, absolute times do not
+BUSY = 0.25  # cores used by others, above which comparisons remain valid but absolute times do not
 MISSING = "not measured"
 
 
 @dataclass(frozen=True)
 class Circumstances:
-    """When, how and on what a case was measured.
+    """Date, effort and machine of a measurement.
 
     Attributes:
         date: Local time.
-        effort: Its name.
-        commit: Of the source, "+" if files differ from it.
-        load_average: Of the last minute, at the start.
+        effort: Name of the effort.
+        commit: Commit of the source, with "+" if files differ from it.
+        load_average: Load average of the last minute at the start.
         others_cores: Cores that other processes used at the start.
         machine: The computer.
         versions: Python and packages.
@@ -47,17 +47,17 @@ class Circumstances:
 
     @property
     def busy(self) -> bool:
-        """Whether others were at work."""
+        """Whether other processes were using the machine."""
         return self.others_cores > BUSY
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Of one case.
+    """Findings of one case.
 
     Attributes:
         values: Numbers by key, unit in the key's name.
-        data: Tables for figures, as JSON has them.
+        data: Tables for figures, in JSON's types.
     """
 
     values: dict[str, float | str]
@@ -66,18 +66,18 @@ class Findings:
 
 @dataclass(frozen=True)
 class Row:
-    """A quantity held to its target.
+    """A quantity with its target.
 
     Attributes:
         case: Name of the case.
-        key: Of the value.
-        quantity: What it is.
-        unit: Its unit.
-        measured: Its value.
-        target: What it should be, None for information.
+        key: Key of the value.
+        quantity: Description.
+        unit: Unit.
+        measured: Value.
+        target: Required value, None for information.
         rule: "at most" or "at least".
         met: Verdict, None for information.
-        limit: What limits it.
+        limit: Reason of the limit.
     """
 
     case: str
@@ -92,14 +92,14 @@ class Row:
 
 
 def circumstances(effort: str, date: str) -> Circumstances:
-    """Look around, for a second."""
+    """Observe the machine for a second."""
     cores = os.cpu_count() or 1
     others = psutil.cpu_percent(interval=1.0) / 100.0 * cores
     return Circumstances(date, effort, _commit(), psutil.getloadavg()[0], others, asdict(this_machine()), versions())
 
 
 def _commit() -> str:
-    """State of the source."""
+    """Commit of the source."""
     words = ("git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty=+", "--exclude=*")
     try:
         return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
@@ -108,7 +108,7 @@ def _commit() -> str:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Cases that a file keeps, by name; none if there is no such file or it is of another version."""
+    """Cases of a file of findings, by name; none if the file is missing or of another version."""
     if not path.is_file():
         return {}
     kept = json.loads(path.read_text(encoding="utf-8"))
@@ -149,7 +149,7 @@ def _row(table: Mapping[str, Any], values: Mapping[str, float | str]) -> Row:
 
 
 def _filled(text: str, values: Mapping[str, float | str]) -> str:
-    """The text with its numbers: ``{case.key:format}``."""
+    """Insert numbers into a text: ``{case.key:format}``."""
 
     def number(match: re.Match[str]) -> str:
         key, _, form = match[1].partition(":")

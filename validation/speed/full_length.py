@@ -1,4 +1,4 @@
-"""Window against whole rails: the same integrator, time step and passes, and where the whole rails' time goes."""
+"""Window against whole rails with the same integrator, time step and passes, and run time of the latter's stages."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TRANSFORMS, REST = "seats, sine transforms", "vehicle's solve and recording"
 
 
 def full_length(effort: Effort, rounds: Mapping[str, Sequence[Facts]]) -> Findings:
-    """Ratios of real-time factors, and the profile of the full-length step."""
+    """Measure ratios of real-time factors, and profile the full-length step."""
     one, batch = (median_of(rounds[name], "real_time_factor") for name in ("paper", "batch"))
     whole = {modes: median_of(rounds[f"full_{modes}"], "real_time_factor") for modes in (20, 90)}
     found = apart(profile_full_length, *((modes, effort.profile_steps // 5) for modes in (20, 90)))
@@ -59,16 +59,16 @@ def full_length(effort: Effort, rounds: Mapping[str, Sequence[Facts]]) -> Findin
 
 
 def profile_full_length(slab_modes: int, steps: int) -> dict[str, Any]:
-    """Where the time of a full-length step goes, by timers around its methods.
+    """Measure the stages of a full-length step by timers around its methods.
 
     Args:
-        slab_modes: Plate modes a slab.
-        steps: How many to take.
+        slab_modes: Plate modes per slab.
+        steps: Number of steps.
 
     Returns:
-        Time of each stage and of a step [us], and what products with a dense matrix of sines would take.
+        Time of each stage and of a step [us], and of products with a dense matrix of sines.
     """
-    from threadpoolctl import threadpool_limits  # here: the parent imports no more than it needs
+    from threadpoolctl import threadpool_limits  # imported here, since the parent does not need it
 
     from tiengine.irregularity.irregularity import make_irregularity
     from tiengine.scenario.scenario import load_scenario
@@ -102,7 +102,7 @@ def profile_full_length(slab_modes: int, steps: int) -> dict[str, Any]:
 
 
 def _timed(call: Callable[..., Any], stage: str, spent: Counter[str]) -> Callable[..., Any]:
-    """The call, adding its wall time [ns]."""
+    """Wrap a call to add up its wall time [ns]."""
 
     def timed(*arguments: Any, **named: Any) -> Any:
         clock = time.perf_counter_ns()
@@ -114,7 +114,7 @@ def _timed(call: Callable[..., Any], stage: str, spent: Counter[str]) -> Callabl
 
 
 def _dense(seats: int, modes: int, passes: int, repeats: int = 30) -> dict[str, float]:
-    """Products of six rows with the matrix of sines, to the seats and back, in each pass."""
+    """Time products of six rows with the matrix of sines, to the seats and back, in each pass."""
     j, i = np.arange(seats) + 0.5, np.arange(1, modes + 1)
     sines = np.sin(np.pi / seats * np.outer(i, j))
     amplitudes, back = np.ones((6, modes)), np.ascontiguousarray(sines.T)

@@ -1,4 +1,4 @@
-"""Kilometres: time in proportion to the way, memory that does not grow with it."""
+"""Run time and memory over distance."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["length"]
 
 
 def length(effort: Effort, tell: Callable[[str], object]) -> Findings:
-    """Run each length once, each in a process of its own."""
+    """Run each distance once, each in a process of its own."""
     table = []
     for km in effort.lengths_km:
         tell(f"{km:g} km")

@@ -1,4 +1,4 @@
-"""The report: a table on the screen, and ``speed.md``."""
+"""Report: a table on the screen, and ``speed.md``."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from validation.speed.runs import RUNS
 
 __all__ = ["busy_words", "page", "show"]
 
-HEAD = ("case", "quantity", "measured", "target", "", "what limits it")
+HEAD = ("case", "quantity", "measured", "target", "", "limit")
 VERDICTS = {True: "met", False: "MISS", None: ""}
 COLOURS = {True: "green", False: "bold red", None: "dim"}
 
 
 def show(rows: Sequence[Row], console: Console) -> None:
-    """Print the rows."""
+    """Print the table."""
     table = Table(show_lines=True)
     for name in HEAD:
         table.add_column(name, overflow="fold")
@@ -35,16 +35,16 @@ def page(rows: Sequence[Row], cases: Mapping[str, Any], figures: Sequence[str]) 
     """Markdown.
 
     Args:
-        rows: What was held to targets.
+        rows: Quantities with their targets.
         cases: Findings by case, with their circumstances.
-        figures: Files beside the page.
+        figures: Files next to the page.
     """
     judged = [row for row in rows if row.met is not None]
     lines = [
         "# Speed",
         "",
         f"{sum(bool(row.met) for row in judged)} of {len(judged)} targets met. Real-time factor (RTF): wall time over",
-        "simulated time, of the loop, writing included. Medians; runs that are compared took turns.",
+        "simulated time, of the loop, writing included. Medians; compared runs took turns.",
         "Written by `python -m validation.speed`.",
         "",
         *_circumstances(cases),
@@ -53,18 +53,22 @@ def page(rows: Sequence[Row], cases: Mapping[str, Any], figures: Sequence[str]) 
     ]
     lines += ["", "**Rounds**: real-time factors (batches: per train)", "", *_rounds(cases)]
     if "scaling" in cases:
-        lines += ["", "**What a step costs**, by whole and upper range, and its largest stages at the last point", ""]
+        lines += [
+            "",
+            "**Cost of a step**: exponents over the whole and the upper range, largest stages at the last point",
+            "",
+        ]
         lines += _scaling(cases["scaling"]["data"])
     if "full_length" in cases:
-        lines += ["", "**A step of the full-length model** [us]", "", *_full_length(cases["full_length"]["data"])]
+        lines += ["", "**A step of the full-length model** [µs]", "", *_full_length(cases["full_length"]["data"])]
     if "length" in cases:
-        lines += ["", "**Kilometres**, few outputs", "", *_lengths(cases["length"]["data"]["lengths"])]
+        lines += ["", "**Distance**, few outputs", "", *_lengths(cases["length"]["data"]["lengths"])]
     pictures = [f"![{name.removesuffix('.png').replace('_', ' ')}]({name})" for name in figures]
     return "\n".join([*lines, "", *pictures]) + "\n"
 
 
 def busy_words(case: str, seen: Mapping[str, Any]) -> str:
-    """A warning, for a case that was measured on a busy machine."""
+    """Warning for a case that was measured on a busy machine."""
     return f"{case}: other processes used {seen['others_cores']:.1f} cores at the start; absolute times are too long"
 
 
@@ -76,7 +80,7 @@ def _cells(row: Row) -> tuple[str, ...]:
 
 
 def _circumstances(cases: Mapping[str, Any]) -> Iterator[str]:
-    """Machine and versions once if all cases share them, then date and load of each."""
+    """Machine and versions, once if all cases share them, then date and load of each case."""
     seen = {name: found["circumstances"] for name, found in cases.items()}
     for machine in {_machine(each): None for each in seen.values()}:
         yield f"{machine}"
@@ -99,7 +103,7 @@ def _machine(seen: Mapping[str, Any]) -> str:
 
 
 def _rounds(cases: Mapping[str, Any]) -> list[str]:
-    """Spread of the rounds of every run."""
+    """Table of the spread of the rounds of every run."""
     body = []
     for found in cases.values():
         for run, rounds in found["data"].get("rounds", {}).items():
@@ -129,7 +133,7 @@ def _scaling(data: Mapping[str, Any]) -> list[str]:
         axis = data["outputs"][kind]
         values = ", ".join(f"{x:g}: {us:.0f}" for x, us in zip(axis["x"], axis["us"], strict=True))
         body.append((words, values, f"{axis['exponent']:.2f}", "", limit))
-    return _table(("against", "us a step (trains: a train-step)", "exponent", "upper half", "largest stages"), body)
+    return _table(("against", "µs per step (trains: per train-step)", "exponent", "upper half", "largest stages"), body)
 
 
 def _largest(shares: Mapping[str, float]) -> str:
@@ -143,7 +147,7 @@ def _full_length(data: Mapping[str, Any]) -> list[str]:
         (name, *(f"{each['stages_us_per_step'].get(name, 0.0):.0f}" for each in profiles.values())) for name in names
     ]
     body.append(("whole step", *(f"{each['us_per_step']:.0f}" for each in profiles.values())))
-    return _table(("stage", *(f"{modes} modes a slab" for modes in profiles)), body)
+    return _table(("stage", *(f"{modes} modes per slab" for modes in profiles)), body)
 
 
 def _lengths(rows: Sequence[Mapping[str, float]]) -> list[str]:

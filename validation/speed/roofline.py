@@ -1,4 +1,4 @@
-"""The engine's own profile of the paper's case, one train and 16 together: stages, products and the machine's roofs."""
+"""The engine's own profile of the paper's case, one train and 16 together: stages, products, roofline."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WAY = 600.0  # m, more than any profile needs
 
 
 def roofline(effort: Effort) -> Findings:
-    """Profile both."""
+    """Profile both runs."""
     values: dict[str, float | str] = {}
     data: dict[str, Any] = {}
     reports = apart(profiled, *((trains, max(200, effort.profile_steps // trains)) for trains in TOGETHER.values()))
@@ -39,13 +39,13 @@ def roofline(effort: Effort) -> Findings:
 
 
 def profiled(trains: int, steps: int) -> dict[str, Any]:
-    """A profile as JSON has it.
+    """Profile in JSON's types.
 
     Args:
-        trains: Advanced together.
-        steps: How many to measure.
+        trains: Number of trains advanced together.
+        steps: Number of measured steps.
     """
-    from tiengine.profiling.profile import profile  # here: the parent starts no Taichi
+    from tiengine.profiling.profile import profile  # imported here, since the parent starts no Taichi
     from tiengine.scenario.scenario import load_scenario
 
     return asdict(profile(load_scenario("paper", settings_of(RUNS["paper"], WAY)), trains=trains, steps=steps))

@@ -1,4 +1,4 @@
-"""Runs of the engine and of the full-length model, each in a process of its own, in turn where they are compared.
+"""Runs of the engine and of the full-length model, each in a process of its own, taking turns where they are compared.
 
 A process sets up once and then runs again and again, so that only the first of several runs pays for kernels and
 contact table; neither is part of what is compared.
@@ -34,14 +34,14 @@ WARM_UP = 5.0  # m: the first launches load kernels
 
 @dataclass(frozen=True)
 class Run:
-    """A run, as ``cases.toml`` has it.
+    """A run of ``cases.toml``.
 
     Attributes:
-        words: What it is.
+        words: Description.
         scenario: Built-in scenario.
-        settings: Keys to change.
-        workers: Processes.
-        slab_modes: Plate modes a slab of the full-length model; None for the engine.
+        settings: Overrides.
+        workers: Number of processes.
+        slab_modes: Plate modes per slab of the full-length model; None for the engine.
     """
 
     words: str
@@ -55,7 +55,7 @@ RUNS = {name: Run(**table) for name, table in CASES["runs"].items()}
 
 
 def settings_of(run: Run, distance: float) -> dict[str, Any]:
-    """Keys to change for a way of so many metres."""
+    """Overrides for a distance [m]."""
     common: dict[str, Any] = CASES["common"]
     return common | run.settings | {"train.distance": distance}
 
@@ -64,14 +64,14 @@ def perform(run: Run, distance: float) -> Facts:
     """Run in this process, into a temporary file.
 
     Args:
-        run: What.
-        distance: Way [m].
+        run: Run to measure.
+        distance: Distance [m].
 
     Returns:
         Attributes of the result, times in s, memory in MB, and ``file_mb``.
     """
     from tiengine.scenario.scenario import load_scenario
-    from tiengine.simulation.peak_memory import peak_memory  # here: the parent measures nothing and imports little
+    from tiengine.simulation.peak_memory import peak_memory  # imported here, since the parent measures nothing
     from tiengine.simulation.simulate import run as simulate
     from validation.msm.simulate import FullLength, run_full_length
 
@@ -96,19 +96,19 @@ def in_turn(
     """Run several, one after another, round by round.
 
     Args:
-        names: Of runs.
-        rounds: How often each.
-        distance: Way [m].
-        tell: Called with words on what comes next.
+        names: Names of the runs.
+        rounds: Number of repeats of each.
+        distance: Distance [m].
+        tell: Called with a description of the next run.
 
     Returns:
-        For each run its rounds, with ``others_cores``, the cores that other processes used meanwhile.
+        Rounds of each run, with ``others_cores``, the cores that other processes used meanwhile.
     """
     facts: dict[str, list[Facts]] = {name: [] for name in names}
     with ExitStack() as stack:
         processes = {name: stack.enter_context(_process()) for name in names}
         for name, process in processes.items():
-            if RUNS[name].workers == 1:  # workers begin anew each time
+            if RUNS[name].workers == 1:  # workers start again each time
                 tell(f"{RUNS[name].words}, set-up")
                 process.submit(perform, RUNS[name], WARM_UP).result()
         for i in range(rounds):
@@ -122,7 +122,7 @@ def in_turn(
 
 
 def apart(call: Callable[..., T], *calls: Sequence[Any]) -> list[T]:
-    """Call with these arguments, one after another, in one fresh process."""
+    """Call a function with these arguments, one after another, in one new process."""
     with _process() as process:
         return [process.submit(call, *arguments).result() for arguments in calls]
 
@@ -133,15 +133,17 @@ def median_of(facts: Sequence[Facts], key: str) -> float:
 
 
 def _cpu_seconds() -> tuple[float, float, float]:
-    """Clock, processor time of this process and all below it, and of all processes [s]."""
+    """Clock, processor time of this process with its descendants, and of all processes [s]."""
     me = psutil.Process()
-    own = sum(sum(each.cpu_times()[:4]) for each in (me, *me.children(recursive=True)))  # those that ended included
+    own = sum(
+        sum(each.cpu_times()[:4]) for each in (me, *me.children(recursive=True))
+    )  # including descendants that ended
     times = psutil.cpu_times()
     return time.perf_counter(), own, times.user + times.nice + times.system
 
 
 def _process() -> ProcessPoolExecutor:
-    """A process that works when asked; spawned, since Taichi does not outlive a fork."""
+    """A process that works on request; spawned, since Taichi does not survive a fork."""
     return ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet)
 
 

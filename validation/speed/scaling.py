@@ -1,4 +1,4 @@
-"""What a step costs over modes, window, slabs, outputs and trains, with fitted exponents."""
+"""Cost of a step over modes, window, slabs, outputs and trains, with fitted exponents."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ __all__ = ["AXES", "Axis", "exponent", "scaling"]
 PITCH = 5.67  # m, of the slabs
 MODES = 60
 PER_METRE = 60 / 36.0
-WAY = 600.0  # m, of the scenarios; a bench runs as far as it is told
+WAY = 600.0  # m, of the scenarios; a bench ignores it
 SETTLED = 0.5
 """A power law is fitted over all points, and over the upper half, where constant costs matter less."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Something to vary.
+    """A quantity to vary.
 
     Attributes:
-        words: What it is.
-        x: Its values.
-        change: Fields of the engine's ingredients at a value.
-        unit: What a time is divided by: "step" of all trains, or "train-step".
+        words: Description.
+        x: Values.
+        change: Changed fields of the engine's ingredients at a value.
+        unit: Unit of the cost: "step" of all trains, or "train-step".
     """
 
     words: str
@@ -42,7 +42,7 @@ class Axis:
 AXES = {
     "modes": Axis("modes N of a rail field, window 36 m", (30, 60, 120, 240), lambda n: {"modes": int(n)}),
     "window": Axis(
-        "window [m], 1.67 modes a metre",
+        "window [m], 1.67 modes per metre",
         (28, 40, 60, 84, 120),
         lambda length: {"length": float(length), "modes": round(PER_METRE * length)},
     ),
@@ -60,7 +60,7 @@ CHANNELS = (1, 3, 6, 10, 14)  # of each wheel, every step
 
 
 def scaling(effort: Effort, tell: Callable[[str], object]) -> Findings:
-    """Measure every axis, then outputs."""
+    """Measure every axis, then the outputs."""
     calls = [(name, effort.bench_rounds, effort.bench_steps) for name in AXES]
     data = dict(zip(AXES, apart(measure_axis, *calls), strict=True))
     tell("recorded outputs")
@@ -70,8 +70,8 @@ def scaling(effort: Effort, tell: Callable[[str], object]) -> Findings:
 
 
 def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
-    """Time of a step at every value of an axis [us], and what of it is largest at the last."""
-    from threadpoolctl import threadpool_limits  # here: the parent starts no Taichi
+    """Time of a step at every value of an axis [us], and its largest stages at the last."""
+    from threadpoolctl import threadpool_limits  # imported here, since the parent starts no Taichi
 
     from tiengine.engine import backend
     from tiengine.model.from_scenario import ingredients

@@ -55,7 +55,7 @@ def batch(rounds: Rounds) -> Findings:
 
 
 def factors(rounds: Rounds, names: Sequence[str]) -> dict[str, dict[str, list[float]]]:
-    """Real-time factor of every round, and what other processes took of the cores meanwhile, by run."""
+    """Real-time factor of every round, and cores used by other processes meanwhile, by run."""
     keys = {"rtf": "real_time_factor", "others_cores": "others_cores"}
     return {name: {key: [float(each[fact]) for each in rounds[name]] for key, fact in keys.items()} for name in names}
 

@@ -1,4 +1,4 @@
-"""Driving the step by hand: models at any step or number of trains, marches with every step recorded."""
+"""Steps without the run's loop: models at any time step or number of trains, every step recorded."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def model_of(name: str, *overrides: str, dt: float, **changes: Any) -> Model:
 
 
 @dataclass(eq=False)
-class March:
-    """What a march leaves.
+class History:
+    """Record of every step.
 
     Attributes:
         model, state: After the last step.
@@ -72,7 +72,7 @@ class March:
         return self.wheel[..., at.LATERAL_FORCE]
 
 
-def march(
+def run_steps(
     name: str,
     *overrides: str,
     dt: float,
@@ -81,7 +81,7 @@ def march(
     each: Callable[[int, Stepper], None] | None = None,
     model: Model | None = None,
     **options: Any,
-) -> March:
+) -> History:
     """Advance a scenario at constant speed and keep every step; the window's rear end begins at chainage zero.
 
     Args:
@@ -111,8 +111,8 @@ def march(
         for first in range(0, steps, CHUNK):
             count = min(CHUNK, steps - first)
             X = V * dt * np.arange(first + 1, first + count + 1)
-            felt = track.sample(X[:, None] + model.ingredients.wheel_s)
-            stepper.load(X, np.full(count, V), np.zeros(count), felt[None])
+            irregularity = track.sample(X[:, None] + model.ingredients.wheel_s)
+            stepper.load(X, np.full(count, V), np.zeros(count), irregularity[None])
             for i in range(count):
                 stepper.step(i, i, i)
                 if each is not None:
@@ -120,4 +120,4 @@ def march(
             wheels.append(chunk.wheel[0, :count].copy())
             bodies.append(chunk.body[0, :count].copy())
     time = dt * np.arange(1, steps + 1)
-    return March(model, state, time, np.concatenate(wheels), np.concatenate(bodies))
+    return History(model, state, time, np.concatenate(wheels), np.concatenate(bodies))
