@@ -258,7 +258,9 @@ def solve_wheelset(
             )  # fmt: skip
             share, best = 1.0, size
             base_l, base_r = f_l, f_r
-            last, change = change, ti.abs(step).max()
+            last, change = change, 0.0
+            for m in ti.static(range(6)):  # entry by entry: vector mode has no absolute value of a vector
+                change = ti.max(change, ti.abs(step[m]))
             remains = change
             if change < last:
                 remains = change * (change / last)

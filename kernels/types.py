@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     Reals5 = NDArray[np.float64]
     Ints1 = NDArray[np.int32]
     Ints2 = NDArray[np.int32]
+    Ints3 = NDArray[np.int32]
     Array = Any
     Template = Any
 else:
@@ -30,5 +31,6 @@ else:
     Reals5 = ti.types.ndarray(dtype=ti.f64, ndim=5)
     Ints1 = ti.types.ndarray(dtype=ti.i32, ndim=1)
     Ints2 = ti.types.ndarray(dtype=ti.i32, ndim=2)
+    Ints3 = ti.types.ndarray(dtype=ti.i32, ndim=3)
     Array = ti.template()  # an array passed to a ti.func
     Template = ti.template()  # a vector, matrix or compile-time constant passed to a ti.func

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
+from tiengine.model.spline_model import SplineModel, build_spline_model
 from tiengine.scenario.scenario import load_scenario
 
 V350 = 350.0 / 3.6
@@ -24,8 +24,8 @@ V350 = 350.0 / 3.6
 
 
 @cache
-def _base(overrides: tuple[str, ...]) -> Ingredients:
-    return ingredients(load_scenario("paper", overrides), 1e-4)
+def _base(overrides: tuple[str, ...], name: str = "paper") -> Ingredients:
+    return ingredients(load_scenario(name, overrides), 1e-4)
 
 
 def paper_model(*overrides: str, V: float = V350, dt: float = 1e-4, **changes: Any) -> Model:
@@ -40,17 +40,22 @@ def paper_model(*overrides: str, V: float = V350, dt: float = 1e-4, **changes: A
     return build_model(replace(_base(overrides), newmark=Newmark(dt), **changes), V)
 
 
+def default_model(*overrides: str, V: float = V350, dt: float = 2e-4, **changes: Any) -> SplineModel:
+    """Model of the scenario ``default``, whose rails are splines; arguments as for :func:`paper_model`."""
+    return build_spline_model(replace(_base(overrides, "default"), newmark=Newmark(dt), **changes), V)
+
+
 class Run:
     """A state advanced at constant speed, every step recorded."""
 
     def __init__(self, model: Model, V: float, X: float = 0.0, steps: int = 1000, start: bool = True) -> None:
         """Put the train into steady rolling at chainage X of the window's rear end [m]."""
         self.model, self.V, self.X = model, V, X
-        self.state = SineState.at_rest(model)
+        self.state = state_at_rest(model)
         if start:
             equilibrium(model, self.state, X, V)
         self.chunk = Chunk.empty(model.ingredients, steps, steps, steps)
-        self.stepper = SineStepper(model, self.state, self.chunk)
+        self.stepper = make_stepper(model, self.state, self.chunk)
 
     def advance(self, steps: int, irregularity: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Advance; returns the wheels' output, shape (steps, W, 2, N_WHEEL)."""

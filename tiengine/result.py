@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from tiengine.indices.metrics import Metrics
     from tiengine.scenario.scenario import Scenario
+    from tiengine.vehicle.connector import VehicleClass
 
 __all__ = ["Result", "open"]
 
@@ -63,18 +64,19 @@ class Result(Reader):
             return stacked_dataset(self, self.file, group)
         return open_dataset(self, self.file, group, train)
 
-    def metrics(self, train: int | None = None) -> Metrics:
+    def metrics(self, train: int | None = None, *, vehicle_class: VehicleClass | None = None) -> Metrics:
         """Indices defined by standards (docs/indices.md).
 
         Args:
             train: Index of one train; None evaluates all.
+            vehicle_class: ``"coach"``, ``"locomotive"`` or ``"freight"``, instead of what the vehicles' data state.
 
         Raises:
             InputError: There is no such train, or the file lacks channels that the indices need.
         """
         from tiengine.indices.metrics import evaluate
 
-        return evaluate(self, train)
+        return evaluate(self, train, vehicle_class)
 
 
 def open(path: Path | str) -> Result:

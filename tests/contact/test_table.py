@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tiengine.contact.conicity import wheelset_position
 from tiengine.contact.profile import Profile, load_profile
 from tiengine.contact.search import find_contacts
 from tiengine.contact.table import ContactSettings, ContactTable, WheelRailPair, build_contact_table
@@ -85,11 +86,11 @@ def test_gap_slopes(pair: WheelRailPair) -> None:
 
 def test_table_shape_and_origin(table: ContactTable) -> None:
     """Nodes are multiples of the steps, one beyond the range at each end; the gap at (0, 0) is zero."""
-    assert table.values.shape == (1163, 51, 10)
+    assert table.values.shape == (1163, 99, 10)
     assert table.values.flags.c_contiguous
     assert table.values.dtype == np.float64
     assert table.u_min == pytest.approx(-16.025e-3)
-    assert table.alpha_min == pytest.approx(-6.25e-3)
+    assert table.alpha_min == pytest.approx(-12.25e-3)
     assert np.isfinite(table.values).all()
     assert table.lookup(0.0, 0.0)[0] == 0.0
 
@@ -170,7 +171,28 @@ def test_lookup_is_continuously_differentiable(table: ContactTable, direction: s
 
 def test_beyond_the_range_the_end_is_taken(table: ContactTable) -> None:
     """A wheel past the table sees its last column, not an extrapolated cubic."""
-    np.testing.assert_array_equal(table.lookup(0.05, 0.1), table.lookup(13e-3 + 1e-12, 6e-3 + 1e-12))
+    np.testing.assert_array_equal(table.lookup(0.05, 0.1), table.lookup(13e-3 + 1e-12, 12e-3 + 1e-12))
+
+
+@pytest.mark.parametrize(("rail", "settings"), [("CHN60", {}), ("60E1", {"gauge_depth": 0.014, "half_spacing": 0.75})])
+def test_tilt_of_a_wheel_on_its_flange_is_within_the_table(rail: str, settings: dict[str, float]) -> None:
+    """S1002 on straight track, shifted until the table ends in u: the roll stays inside, with 2 mrad to spare.
+
+    On the flange, where roll is steepest (beyond the 6 mrad that the table once held), the gap is that of the search.
+    """
+    pair = WheelRailPair(load_profile("S1002", "wheel"), load_profile(rail, "rail"), ContactSettings(**settings))
+    y = np.arange(0.0, 11e-3, 0.25e-3)
+    roll = wheelset_position(pair, y).roll
+    u = y - pair.settings.wheel_radius * roll
+    within = u < pair.settings.u_max
+    assert np.abs(roll[within]).max() < pair.settings.alpha_max - 2e-3
+    assert u.max() > pair.settings.u_max
+
+
+def test_the_table_is_that_of_the_search_at_large_tilt(table: ContactTable, pair: WheelRailPair) -> None:
+    """On the flank at 7 to 11 mrad; smoothing by 0.1 mm is linear there, the grid of 0.25 mrad leaves 1 um."""
+    u, alpha = np.full(5, 11e-3), -np.linspace(7e-3, 11e-3, 5)
+    np.testing.assert_allclose(table.lookup(u, alpha)[:, 0], pair.contacts(u, alpha).gap, atol=1e-6)
 
 
 def test_unsmoothed_table_is_the_pair(pair: WheelRailPair) -> None:

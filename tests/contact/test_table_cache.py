@@ -13,7 +13,7 @@ COARSE = ContactSettings(du=5e-5, dalpha=2e-3, smoothing=0.0)
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setenv(contact_cache.FOLDER, str(tmp_path / "cache"))
+    monkeypatch.setenv("TIENGINE_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
 
 
@@ -53,5 +53,5 @@ def test_broken_file_is_built_anew(folder, profiles, content):
 def test_no_folder_no_harm(tmp_path, profiles, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
-    monkeypatch.setenv(contact_cache.FOLDER, str(blocked))
+    monkeypatch.setenv("TIENGINE_CACHE", str(blocked))
     assert np.isfinite(contact_table(*profiles, COARSE).values).all()

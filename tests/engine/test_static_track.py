@@ -10,7 +10,7 @@ from tiengine.engine.sine_state import SineState
 from tiengine.engine.static_track import StaticTrack
 from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
-from tiengine.model.model import Model
+from tiengine.model.sine_model import SineModel as Model
 
 from ..explicit import Explicit
 from ..models import V350, paper_model
@@ -37,16 +37,16 @@ def test_published_deflection(beam: str, modes: int) -> None:
         section = model.ingredients.rail
         model = paper_model(modes=modes, rail=section.model_copy(update={"G": 1e5 * section.G}))
     state = SineState.at_rest(model)
-    state.enter(model, 0, 0)
+    state.enter(0, 0)
     state.first_slab = RIGID_GROUND
     track = StaticTrack(model, state, 0.315, 0.0)
     for place, printed in zip((SEAT, MIDSPAN), PUBLISHED[beam, modes], strict=True):
         shape = model.window.shape(np.array([place]))[0]
         load = np.zeros(10 * modes)
         load[:modes] = 70e3 * shape
-        rails, _ = track.respond(load)
-        assert abs(1e3 * shape @ rails[0, :modes] - printed) < 0.6e-5  # half a digit, and the shear left: 3e-7
-        assert not rails[1].any()  # on rigid ground the other rail rests
+        vertical, _, _ = track.respond(load)
+        assert abs(1e3 * shape @ vertical[0, :modes] - printed) < 0.6e-5  # half a digit, and the shear left: 3e-7
+        assert not vertical[1].any()  # on rigid ground the other rail rests
 
 
 def balance(model: Model, state: SineState, X: float, V: float) -> NDArray[np.float64]:
@@ -77,14 +77,13 @@ def test_kernels_balance_the_static_solution(X: float, V: float, overrides: tupl
     model = paper_model(*overrides, V=V350)
     state = SineState.at_rest(model)
     clock = window_clock(model.ingredients.slab, np.array([X]), np.array([V]), np.zeros(1))[0]
-    state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
+    state.enter(int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
     track = StaticTrack(model, state, float(clock[at.FIRST_SEAT_S]), V)
     rng = np.random.default_rng(5)
     force = rng.standard_normal((4, 2, 3)) * [70e3, 20e3, 2e3]
-    rails, slabs = track.motion(force)
+    vertical, lateral, slabs = track.motion(force)
     n = model.ingredients.modes
-    state.view(at.U, "vertical")[0] = rails[:, : 2 * n]
-    state.view(at.U, "lateral")[0] = rails[:, 2 * n :]
+    state.view(at.U, "vertical")[0], state.view(at.U, "lateral")[0] = vertical, lateral
     state.view(at.U, "slabs")[0] = slabs
     on_slabs = balance(model, state, X, V)
     shape = model.wheel_shape[0]
@@ -96,7 +95,7 @@ def test_kernels_balance_the_static_solution(X: float, V: float, overrides: tupl
     assert np.abs(state.motion[at.F, : int(model.dims[at.SLABS])]).max() < 2e-3
     assert np.abs(on_slabs).max() < 2e-3
     moved = track.under_wheels(force[None])[0]
-    np.testing.assert_allclose(moved[:, :, 0], (shape @ rails[:, :n].T), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(moved[:, :, 0], (shape @ vertical[:, :n].T), rtol=1e-9, atol=1e-12)
     assert not moved[:, :, 6:].any()  # at rest in the moving frame
 
 
@@ -104,7 +103,7 @@ def test_compliance_is_symmetric_at_rest() -> None:
     """Maxwell and Betti: at V = 0 the compliance between wheels is symmetric; convection and dampers break it."""
     model = paper_model()
     state = SineState.at_rest(model)
-    state.enter(model, 0, 0)
+    state.enter(0, 0)
 
     def compliance(V: float) -> NDArray[np.float64]:
         track = StaticTrack(model, state, 0.315, V)
@@ -124,7 +123,7 @@ def test_local_compliance_stands_in_for_the_modes_left_out() -> None:
     for modes, local in ((72, False), (72, True), (288, True)):
         model = paper_model(modes=modes, local_compliance=local)
         state = SineState.at_rest(model)
-        state.enter(model, 0, 0)
+        state.enter(0, 0)
         load = np.zeros((1, 4, 2, 3))
         load[..., 0], load[..., 1], load[..., 2] = 69e3, 3e3, 300.0
         found[modes, local] = StaticTrack(model, state, 0.315, V).under_wheels(load)[0]

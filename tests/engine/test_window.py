@@ -52,11 +52,11 @@ def test_slabs_keep_their_state() -> None:
     slots = model.ingredients.slots
     rng = np.random.default_rng(2)
     memory: dict[int, np.ndarray] = {}
-    state.enter(model, 0, 0)
+    state.enter(0, 0)
     rows = [at.U, at.V, at.A]
     before = range(0)
     for first in (0, 1, 2, 3, 3, 5, 6, 11, 12, 40, 41):
-        state.enter(model, first * 9, first)
+        state.enter(first * 9, first)
         now = range(first, first + slots)
         for slab in now:
             q = np.stack([state.view(row, "slabs")[0, slab % slots] for row in rows])

@@ -237,7 +237,7 @@ def foreign(kind: str, path: Path) -> None:
         with h5py.File(path, "w") as file:
             if kind != "HDF5":
                 file.attrs["format"] = "tiengine"
-                file.attrs["format_version"] = {"old": 0, "new": 2, "odd": [1, 2], "words": "1"}[kind]
+                file.attrs["format_version"] = {"old": 0, "new": 3, "odd": [1, 2], "words": "1"}[kind]
                 file.attrs["tiengine_version"] = "9.8"
 
 

@@ -4,8 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import signal
 
-from tiengine.indices.filters import WEIGHTINGS, band_pass, block_rms, low_pass, sliding_mean, weighted
+from tiengine.indices.filters import (
+    WEIGHTINGS,
+    band_pass,
+    band_pass_settling,
+    block_rms,
+    low_pass,
+    low_pass_settling,
+    sliding_mean,
+    weighted,
+)
 
 THIRDS = np.array(
     [0.1, 0.125, 0.16, 0.2, 0.25, 0.315, 0.4, 0.5, 0.63, 0.8, 1, 1.25, 1.6, 2, 2.5, 3.15, 4, 5, 6.3, 8, 10, 12.5, 16,
@@ -132,3 +142,50 @@ def test_block_rms_leaves_the_rest_out():
     """Two whole blocks of five samples of twelve."""
     series = np.array([3.0] * 5 + [1.0, -1.0, 1.0, -1.0, 1.0] + [99.0] * 2)
     np.testing.assert_allclose(block_rms(series, 0.2, 1.0), [3.0, 1.0], rtol=1e-15)
+
+
+PHASES = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+
+
+@pytest.mark.parametrize("f", [0.5, 0.7, 1.0, 2.0, 5.0, 9.0])
+@pytest.mark.parametrize("phase", PHASES)
+def test_band_pass_of_a_sine_whatever_its_phase(f, phase):
+    """Six seconds that end anywhere: the steady response to 1 % of the amplitude but for the settling at the ends."""
+    h, time = 1e-3, 1e-3 * np.arange(6000)
+    low, high = (np.tan(np.pi * cut_off * h) / np.tan(np.pi * f * h) for cut_off in (0.4, 10.0))
+    gain = 1.0 / (1.0 + (np.sqrt(2.0) - 1.0) * low**4) / (1.0 + (np.sqrt(2.0) - 1.0) / high**4)
+    series = np.sin(2.0 * np.pi * f * time + phase)
+    margin = round(band_pass_settling(0.4, 10.0) / h)
+    error = (band_pass(series, h, 0.4, 10.0) - gain * series)[margin:-margin]
+    assert np.abs(error).max() < 0.01
+
+
+@pytest.mark.parametrize("phase", PHASES)
+def test_low_pass_of_a_sine_whatever_its_phase(phase):
+    """At the cut-off, the worst case."""
+    series = 70.0 + np.sin(40.0 * np.pi * 1e-3 * np.arange(1000) + phase)
+    margin = round(low_pass_settling(20.0) / 1e-3)
+    error = low_pass(series, 1e-3, 20.0) - 70.0 - np.sqrt(0.5) * (series - 70.0)
+    assert np.abs(error[margin:-margin]).max() < 0.01
+
+
+@pytest.mark.parametrize("name", ["Wb", "Wd", "Wk"])
+@pytest.mark.parametrize("f", [0.5, 1.0, 2.0, 8.0])
+@pytest.mark.parametrize("phase", PHASES)
+def test_weighted_rms_of_a_sine_whatever_its_phase(name, f, phase):
+    """The very first block of 5 s has the weight: the weighting finds no beginning of the sine; 1 %."""
+    series = np.sin(2.0 * np.pi * f * 1e-3 * np.arange(6000) + phase)
+    expected = abs(WEIGHTINGS[name].response(np.array([f]))[0]) * np.sqrt(0.5)
+    assert block_rms(weighted(series, 1e-3, name), 1e-3, 5.0)[0] == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("begin", [15.0, 20.0, 25.0, 30.0])
+def test_cutting_a_record_changes_little(begin):
+    """Six of sixty seconds of noise at 0.3 to 3 Hz: 5 % of the standard deviation at the worst sample."""
+    h = 2e-3
+    sections = signal.butter(2, [0.3, 3.0], "band", fs=1.0 / h, output="sos")
+    series = signal.sosfiltfilt(sections, np.random.default_rng(7).standard_normal(round(60.0 / h)))
+    part = slice(round(begin / h), round((begin + 6.0) / h))
+    margin = round(band_pass_settling(0.4, 10.0) / h)
+    whole, cut = band_pass(series, h, 0.4, 10.0)[part], band_pass(series[part], h, 0.4, 10.0)
+    assert np.abs(cut - whole)[margin:-margin].max() < 0.05 * whole.std()

@@ -13,7 +13,6 @@ from tiengine.irregularity.irregularity import (
     PATCH_HALF_LENGTH,
     IrregularityParams,
     at_wheels,
-    check_step,
     make_irregularity,
 )
 from tiengine.irregularity.spectrum import (
@@ -24,6 +23,7 @@ from tiengine.irregularity.spectrum import (
     load_spectrum,
     sigma,
 )
+from tiengine.irregularity.track_checks import check_step
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import explain
 
@@ -307,8 +307,11 @@ def test_bad_parameters_are_refused(settings, message):
 
 def test_bad_use_is_refused():
     """Waves that the step cannot follow, chainages that are no numbers."""
-    with pytest.raises(InputError, match=r"shortest wavelength = 0.05: must be at least 8 V dt = 0.0776 m at a time"):
-        check_step(track(wavelength_min=0.05).shortest_wavelength, 97.0, 1e-4)
-    check_step(track().shortest_wavelength, 97.0, 1e-3)
+    with pytest.raises(
+        InputError,
+        match=r"shortest wavelength = 0.05 m: must be at least 8 V dt = 0.0776 m at a time step of 0.0001 s;",
+    ):
+        check_step(IrregularityParams(), track(wavelength_min=0.05).shortest_wavelength, 97.0, 1e-4)
+    check_step(IrregularityParams(), track().shortest_wavelength, 97.0, 1e-3)
     with pytest.raises(InputError, match="chainage must be finite"):
         track().sample(np.array([0.0, np.nan]))

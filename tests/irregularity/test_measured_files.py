@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tiengine.irregularity.irregularity import IrregularityParams, at_wheels, make_irregularity
-from tiengine.irregularity.measured_files import LEVEL_BASE, band_passed, read_series
+from tiengine.irregularity.measured_files import LEVEL_BASE, read_series
+from tiengine.irregularity.wave_content import band_passed
 from tiengine.parameters.errors import InputError
 
 DATA = Path(__file__).parents[1] / "data"
@@ -81,7 +82,7 @@ def test_both_directions(tmp_path, falls, reverse):
     header = "mileage,vertical_left,vertical_right,alignment_left,alignment_right"
     path = write(tmp_path / "track.csv", header, mileage, *RAILS["z"], *RAILS["y"])
     first = mileage[-1] if reverse else mileage[0]
-    series = read_series(path, start=first - 10.0 if falls == reverse else first + 10.0, reverse=reverse)
+    series = read_series(path, start=first - 10.0 if falls == reverse else first + 10.0, reverse=reverse).values
     np.testing.assert_allclose(series[:, 0], X + 10.0, atol=1e-9)
     z, y = (RAILS["z"][::-1, ::-1], -RAILS["y"][::-1, ::-1]) if reverse else (RAILS["z"], RAILS["y"])
     np.testing.assert_allclose(series[:, 1], z.mean(axis=0), atol=1e-14)
@@ -92,7 +93,7 @@ def test_both_directions(tmp_path, falls, reverse):
 
 def test_hand_made_file():
     """Falling mileage in km, heights up in mm by key, alignment in mm by header."""
-    series = read_series(DATA / "track.csv", unit="mm", vertical_up=True)
+    series = read_series(DATA / "track.csv", unit="mm", vertical_up=True).values
     assert series[:, 0] == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0])
     assert series[0] == pytest.approx([0.0, -1.5e-3, 0.5e-3, -1e-3 / 1.5, 1e-3])
     assert series[2] == pytest.approx([2.0, 0.0, 2e-3, 0.0, 2e-3])
@@ -108,7 +109,7 @@ def test_file_behind_the_train_is_refused(tmp_path):
 def test_default_chainage_is_the_mileage(tmp_path):
     """A file that rises needs no start; it is where it says it is."""
     path = write(tmp_path / "track.csv", "x,z_v", X + 70.0, X)
-    assert read_series(path)[0, 0] == 70.0
+    assert read_series(path).values[0, 0] == 70.0
 
 
 @pytest.mark.parametrize("uneven", [0.0, 0.1])
@@ -133,12 +134,12 @@ def test_band_pass(uneven):
 
 
 def test_band_pass_by_key(tmp_path):
-    """The scenario's wavelengths; the shortest wave is known then."""
+    """The scenario's wavelengths; the shortest wave is the longer of wavelength_min and the content, 20 m here."""
     x = np.arange(0.0, 400.0, 0.25)
     path = write(tmp_path / "track.csv", "x,z_v", x, np.sin(2 * np.pi * x / 20.0) + 5.0)
     params = IrregularityParams(file=str(path), file_band_pass=True, wavelength_min=3.0, wavelength_max=70.0)
     made = make_irregularity(params, FAR)
-    assert made.shortest_wavelength == 3.0
+    assert 10.0 <= made.shortest_wavelength < 20.0  # a stretch of 20 m: its main lobe reaches to 10 m
     middle = np.linspace(150.0, 250.0, 101)
     np.testing.assert_allclose(made.sample(middle)[:, 0], np.sin(2 * np.pi * middle / 20.0), atol=5e-3)
     for keys, message in (

@@ -36,10 +36,10 @@ def test_measured_series(tmp_path):
         ("x,x,z_v\n", "line 1: a column is named twice"),
         ("z_v,theta\n0,0\n", "line 1: needs column 'x'"),
         (MEASURED + "98.5,low,0\n", "line 53: z_v = 'low': must be a finite number"),
-        (MEASURED + "98.5,nan,0\n", "line 53: z_v = 'nan': must be a finite number"),
+        (MEASURED + "98.5,nan,0\n", "line 53: z_v has no value up to line 53: must not lack values at an end"),
         (MEASURED + "98.5,0\n", "line 53: 2 values; the header names 3 columns"),
         (MEASURED + "97,0,0\n", "line 53: x = 97: must be > the x before it"),
-        ("x,z_v\n0,0\n1,0\n", "line 3: 2 points; a spline needs at least 4"),
+        ("x,z_v\n0,0\n1,0\n", "line 3: 2 points; must have at least 4 for a spline"),
     ],
 )
 def test_bad_file_is_refused(tmp_path, text, reason):

@@ -47,7 +47,7 @@ class Seated:
         clock = window_clock(model.ingredients.slab, np.array([X]), np.array([V]), np.zeros(1))
         self.clock = clock
         self.first_slab = int(clock[0, at.FIRST_SLAB])
-        self.state.enter(model, int(clock[0, at.FIRST_SEAT]), self.first_slab)
+        self.state.enter(int(clock[0, at.FIRST_SEAT]), self.first_slab)
         self.constants = model.constants.copy()
 
     def randomise(self, seed: int) -> None:

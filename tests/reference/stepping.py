@@ -13,8 +13,9 @@ from threadpoolctl import threadpool_limits
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium, release
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper, state_at_rest
+from tiengine.engine.state import State
+from tiengine.engine.stepper import Stepper
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
@@ -55,7 +56,7 @@ class History:
     """
 
     model: Model
-    state: SineState
+    state: State
     time: NDArray[np.float64]
     wheel: NDArray[np.float64]
     body: NDArray[np.float64]
@@ -77,7 +78,7 @@ def run_steps(
     dt: float,
     duration: float,
     start: str = "equilibrium",
-    each: Callable[[int, SineStepper], None] | None = None,
+    each: Callable[[int, Stepper], None] | None = None,
     model: Model | None = None,
     **options: Any,
 ) -> History:
@@ -96,14 +97,14 @@ def run_steps(
     given = scenario(name, *overrides)
     V = given.train.speed.at(0.0)[0]
     model = model or model_of(name, *overrides, dt=dt)
-    state = SineState.at_rest(model)
+    state = state_at_rest(model)
     if start == "equilibrium":
         equilibrium(model, state, 0.0, V)
     else:
         release(model, state, 0.0)
     track = make_irregularity(given.irregularity, float(model.ingredients.wheel_s.max()))
     chunk = Chunk.empty(model.ingredients, CHUNK, CHUNK, CHUNK)
-    stepper = SineStepper(model, state, chunk, **options)
+    stepper = make_stepper(model, state, chunk, **options)
     steps = round(duration / dt)
     wheels, bodies = [], []
     with threadpool_limits(1):

@@ -16,6 +16,7 @@ from tiengine.parameters.presets import KINDS, find_preset, preset_names, preset
 from tiengine.scenario.overrides import parse_value
 from tiengine.scenario.scenario import check_wavelength, load_scenario, to_toml
 from tiengine.track.defects import FailedFastenings, fastening_factors
+from tiengine.track.sines import Sines
 from tiengine.vehicle.vehicle import load_vehicle
 
 TRAIN = {"vehicles": ["CRH380A_v2"], "speed_kmh": 300.0, "distance": 100.0}
@@ -36,7 +37,7 @@ def test_paper_is_the_papers_case():
     assert paper.train.speed.is_constant
     assert paper.train.speed.fastest == pytest.approx(350 / 3.6, rel=1e-15)  # one rounding
     assert paper.train.distance == 600.0
-    assert (paper.window_length, paper.modes) == (36.0, 60)
+    assert (paper.window_length, paper.trial_functions) == (36.0, Sines(36.0, 60))
     assert paper.numerics.start == "equilibrium"
     assert paper.irregularity.spectrum == "german_low"
     parts = paper.parts
@@ -147,6 +148,33 @@ def test_override_inside_a_list():
     scenario = load_scenario("defects", ["track.failed_fastenings.0.factor=0.5", "train.vehicles.0.car.mass=50e3"])
     assert scenario.track.failed_fastenings[0].factor == 0.5
     assert scenario.parts.vehicles[0].body[0].mass == 50e3
+
+
+@pytest.mark.parametrize(
+    ("setting", "key", "value"),
+    [
+        ("track.rail_profile=60E1", "rail_profile", "60E1"),  # a number in TOML: 60 times 10
+        ("track.rail_profile='60E1'", "rail_profile", "60E1"),
+        ("track.rail={like = '60E1'}", "rail", {"like": "60E1"}),
+        ("track.rail.like=60E1", "rail", {"like": "60E1"}),
+        ("track.slab.elements_x=18", "slab", {"like": "CRTS_III", "elements_x": 18}),
+        ("track.fastening.vertical_stiffness=5e7", "fastening", {"like": "ACE2021", "vertical_stiffness": 5e7}),
+    ],
+)
+def test_overrides_of_parts(setting, key, value):
+    """Names that look like numbers stay names; a key of a part that is left out changes the default part."""
+    for source in ("default", {"train": TRAIN}):
+        assert getattr(load_scenario(source, [setting]).track, key) == value
+
+
+def test_names_like_numbers():
+    """Every key that takes names only; keys that take a word or a number still read numbers."""
+    gauge = "gauges=[{name='1', on='rail', chainage=60.0, side='left'}]"
+    scenario = load_scenario("paper", ["name=2024", "irregularity.file=1e3", "numerics.window=1e2", gauge])
+    assert (scenario.name, Path(scenario.irregularity.file).name, scenario.gauges[0].name) == ("2024", "1e3", "1")
+    assert scenario.window_length == 100.0
+    assert "train.vehicles[0] = '60': no such preset" in refusal("paper", ["train.vehicles.0=60"])
+    assert "train.wheel_profile = 'true': no such preset" in refusal("paper", ["train.wheel_profile=true"])
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,6 @@ from tiengine.simulation.tasks import plan
 SHORT = {
     "train.distance": 3.0,
     "train.speed_kmh": 300.0,
-    "numerics.modes_per_metre": 2.0,
     "numerics.truncation": "none",
     "numerics.time_step": 2e-4,
     "output.precision": "double",

@@ -180,7 +180,7 @@ def test_step_against_host() -> None:
     model = paper_model(modes=24, trains=2)
     state, g = SineState.at_rest(model), model.ingredients
     clock = window_clock(model.ingredients.slab, np.array([33.3]), np.array([V350]), np.array([V_RATE]))
-    state.enter(model, int(clock[0, at.FIRST_SEAT]), int(clock[0, at.FIRST_SLAB]))
+    state.enter(int(clock[0, at.FIRST_SEAT]), int(clock[0, at.FIRST_SLAB]))
     rng = np.random.default_rng(3)
     state.motion[at.U_PREDICTED] = 1e-3 * rng.standard_normal(state.motion.shape[1])
     state.motion[at.V_PREDICTED] = rng.standard_normal(state.motion.shape[1])

@@ -39,7 +39,7 @@ def case():
     model = paper_model(modes=60)
     state = SineState.at_rest(model)
     clock = window_clock(model.ingredients.slab, np.array([33.3]), np.array([V350]), np.zeros(1))[0]
-    state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
+    state.enter(int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
     return model, state, clock
 
 
@@ -57,7 +57,8 @@ def test_sines_are_todays(case):
         seats_of(model, clock), slabs_of(model, slots), V350, model.ingredients.wheel_s,
     )  # fmt: skip
     force = force_on(model)
-    rails, slabs = old.motion(force)
+    old_vertical, old_lateral, slabs = old.motion(force)
+    rails = np.hstack([old_vertical, old_lateral])
     vertical, lateral, found = new.motion(force)
     by_field = np.concatenate([x.reshape(2, n, -1).transpose(0, 2, 1).reshape(2, -1) for x in (vertical, lateral)], 1)
     scale = np.abs(rails).max(axis=1, keepdims=True)

@@ -25,7 +25,8 @@ ALLOWED: dict[str, set[str] | None] = {
     "track.rail": {"Rail"},
     "track.slab": {"Slab"},
     "model.from_scenario": None,
-    "model.model": {"CONTACT_TOLERANCE", "Ingredients"},
+    "model.constant_data": {"CONTACT_TOLERANCE"},
+    "model.ingredients": {"Ingredients"},
     "model.newmark": None,
     # starting kernels and writing a file
     "engine.backend": None,
@@ -40,7 +41,7 @@ ALLOWED: dict[str, set[str] | None] = {
 START: dict[str, set[str] | None] = {
     "engine.equilibrium": {"equilibrium"},
     "engine.sine_state": {"SineState"},
-    "model.model": {"Ingredients", "build_model"},
+    "model.sine_model": {"build_sine_model"},
 }
 """Besides these, for the start alone, which is the engine's steady rolling."""
 

@@ -108,3 +108,17 @@ def test_bad_tables_are_refused(chainage, speed, message):
     """One line that names row, value and rule."""
     with pytest.raises(InputError, match=message):
         SpeedProfile(chainage, speed)
+
+
+def test_largest_acceleration():
+    """Inside uniform braking; of two points 1.5 times the mean (a cubic with level ends); none at constant speed."""
+    inside = uniformly_braked(97.2, -0.87, np.arange(0.0, 601.0, 50.0))
+    assert inside.largest_acceleration(100.0, 500.0) == pytest.approx(0.87, rel=1e-9)
+    mean = (97.2**2 - 50.0**2) / 2.0 / 600.0
+    two = SpeedProfile.table([0.0, 600.0], [97.2, 50.0])
+    assert two.largest_acceleration(-50.0, 700.0) == pytest.approx(1.5 * mean, rel=1e-12)
+    assert two.largest_acceleration(0.0, 150.0) == pytest.approx(-two.at(150.0)[1], rel=1e-12)
+    assert two.largest_acceleration(601.0, 700.0) == SpeedProfile.constant(80.0).largest_acceleration(0.0, 9.0) == 0.0
+    rates = [abs(BRAKING.at(x)[1]) for x in np.linspace(-10.0, 610.0, 20001)]
+    # the grid misses the vertex by 0.016 m at most
+    assert BRAKING.largest_acceleration(-10.0, 610.0) == pytest.approx(max(rates), rel=1e-6)

@@ -9,28 +9,40 @@ from __future__ import annotations
 import math
 import os
 import signal
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
 from tiengine.cli import reading, simulating
 from tiengine.cli.screen import print_rows, show
-from tiengine.parameters.errors import InputError
+from tiengine.parameters.errors import InputError, InputNote
 from tiengine.parameters.presets import KINDS, preset_names, preset_source
 
 __all__ = ["main"]
 
 
 class _Commands(click.Group):
-    """Group of commands that reports invalid input in one line with exit status 2."""
+    """Group of commands that reports invalid input in one line (exit status 2) and notes on input, one line each."""
 
     def invoke(self, context: click.Context) -> Any:
         """Run a command."""
         try:
-            return super().invoke(context)
+            with warnings.catch_warnings():
+                warnings.simplefilter("always", InputNote)
+                show_others = warnings.showwarning
+
+                def show_note(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+                    if issubclass(category, InputNote):
+                        click.echo(f"note: {' '.join(str(message).split())}", err=True)
+                    else:
+                        show_others(message, category, *place, **more)
+
+                warnings.showwarning = show_note
+                return super().invoke(context)
         except InputError as error:
             click.echo(f"error: {' '.join(str(error).split())}", err=True)
             context.exit(2)
@@ -103,53 +115,41 @@ def profile(
 @click.argument("rail")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Draw a figure to this file, replacing it.")
 @click.option("--json", "as_json", is_flag=True, help="Print all numbers as JSON.")
+@click.option("--cant", type=float, default=0.025, show_default=True, help="Inclination of the rail.")
+@click.option("--canted/--upright", default=None, help="The rail's points are inclined already, or not.")
+@click.option("--gauge", type=float, default=1.435, show_default=True, help="[m]")
+@click.option("--gauge-depth", type=float, default=0.016, show_default=True, help="Below the rail's top [m].")
+@click.option("--half-spacing", type=float, default=0.7465, show_default=True, help="Of the tape circles [m].")
+@click.option("--wheel-radius", type=float, default=0.43, show_default=True, help="At the tape circle [m].")
+@click.option("--tape-circle", type=float, help="Distance of the tape circle outward from the wheel file's y = 0 [m].")
+@click.option("--allow-kinks", is_flag=True, help="Accept kinks where wheel and rail can touch.")
+@click.option("--mirror-rail/--no-mirror-rail", default=None, help="The rail's gauge face is at positive y, or not.")
+@click.option("--smoothing", type=click.FloatRange(0.0, 5e-3), help="Of points; 0.0005 for measured profiles [m].")
 @click.option(
-    "--cant", type=float, default=0.025, show_default=True, help="Cant of the rail (its inclination), 0.025 for 1:40."
-)
-@click.option("--canted", is_flag=True, help="The points of the rail profile include the cant.")
-@click.option("--gauge", type=float, default=1.435, show_default=True, help="Track gauge [m].")
-@click.option(
-    "--gauge-depth",
-    type=float,
-    default=0.016,
+    "--method",
+    type=click.Choice(["harmonic", "en15302"]),
+    default="harmonic",
     show_default=True,
-    help="Depth below the top of the rail at which the gauge is measured [m].",
+    help="Equivalent conicity by harmonic linearisation, or by the integral of EN 15302 (without roll).",
 )
-@click.option(
-    "--half-spacing", type=float, default=0.7465, show_default=True, help="Half the distance of the tape circles [m]."
-)
-@click.option(
-    "--wheel-radius", type=float, default=0.43, show_default=True, help="Wheel radius at the tape circle [m]."
-)
-@click.option(
-    "--tape-circle",
-    type=float,
-    default=0.0,
-    help="Position of the tape circle, outward from y = 0 of the wheel file [m].",
-)
-@click.option(
-    "--mirror-rail/--no-mirror-rail", default=None, help="The gauge face of the rail file is at positive y, or not."
-)
-@click.option(
-    "--smoothing",
-    type=click.FloatRange(0.0, 5e-3),
-    help="Smoothing length of the points [m]; 0.0005 for measured profiles.",
-)
-@click.option("--largest", type=float, default=0.008, show_default=True, help="Largest lateral shift [m].")
+@click.option("--largest", type=float, default=0.008, show_default=True, help="Largest shift [m].")
 def contact(
     wheel: str,
     rail: str,
     output: Path | None,
     as_json: bool,
-    canted: bool,
-    tape_circle: float,
+    canted: bool | None,
+    tape_circle: float | None,
+    allow_kinks: bool,
     mirror_rail: bool | None,
     smoothing: float | None,
     largest: float,
+    method: Literal["harmonic", "en15302"],
     **placement: float,
 ) -> None:
     """Evaluate the contact geometry of WHEEL and RAIL, presets or files: rolling radii, conicity, contact points."""
-    from tiengine.contact.profile import ROUNDING_LENGTH, load_profile
+    from tiengine.contact.point_list import ROUNDING_LENGTH
+    from tiengine.contact.profile import load_profile
     from tiengine.contact.table import ContactSettings
     from tiengine.parameters.quantity import build
     from tiengine.report.contact_report import contact_report, draw
@@ -161,10 +161,11 @@ def contact(
     if output is not None:
         check_output(output, force=True)
     report = contact_report(
-        load_profile(wheel, "wheel", smoothing=length, tape_circle=tape_circle),
-        load_profile(rail, "rail", smoothing=length, has_cant=canted, mirror=mirror_rail),
+        load_profile(wheel, "wheel", smoothing=length, tape_circle=tape_circle, allow_kinks=allow_kinks),
+        load_profile(rail, "rail", smoothing=length, has_cant=canted, mirror=mirror_rail, allow_kinks=allow_kinks),
         build(ContactSettings, placement, "contact"),
         largest,
+        method,
     )
     if output is not None:
         draw(report, output)

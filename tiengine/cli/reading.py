@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from tiengine.cli.screen import print_rows, show
 from tiengine.figures.catalogue import COMPARE, names
+from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import parse_toml
 from tiengine.result_files.summary import SUMMARY, summary
 
+if TYPE_CHECKING:
+    from tiengine.indices.metrics import Metrics
+    from tiengine.vehicle.connector import VehicleClass
+
 __all__ = ["COMMANDS"]
+
+CLASSES = ("coach", "locomotive", "freight")
+TEXT_FILES = (".csv", ".txt")
 
 
 @click.command()
@@ -45,16 +54,35 @@ def info(file: Path) -> None:
 @click.option(
     "--json", "output", type=click.Path(path_type=Path), help="Also write all indices to this file, replacing it."
 )
-def metrics(file: Path, train: int | None, output: Path | None) -> None:
-    """Evaluate the indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631 for a result FILE, with their limits."""
-    from tiengine import result as results
+@click.option("--class", "vehicle_class", type=click.Choice(CLASSES), help="Class of the vehicles, for their limits.")
+@click.option("--column", "columns", multiple=True, metavar="SIGNAL=COLUMN", help="Column of a text file; repeatable.")
+@click.option("--rate", type=float, help="Samples per second of a text file [Hz]; default: its column time.")
+@click.option("--speed", type=float, help="Speed in a text file [km/h]; default: from its column position.")
+@click.option("--static-load", type=float, help="Static wheel load [kN], for wheel forces of a text file.")
+@click.option("--run-in", type=float, help="Distance that is left out at the start of a text file [m].")
+def metrics(
+    file: Path,
+    train: int | None,
+    output: Path | None,
+    vehicle_class: VehicleClass | None,
+    columns: Sequence[str],
+    **measured: float | None,
+) -> None:
+    """Evaluate the indices of EN 14363, GB/T 5599, EN 12299 and ISO 2631, with their limits.
+
+    FILE is a result, or a text file (.csv, .txt) of measured signals (docs/indices.md).
+    """
     from tiengine.report import metrics_table
     from tiengine.result_files.output_file import check_output
 
     if output is not None:
         check_output(output, force=True)
-    with results.open(file) as result:
-        found = result.metrics(train)
+    if file.suffix.lower() in TEXT_FILES:
+        if train is not None:
+            raise InputError(f"--train: {file} holds the signals of one vehicle")
+        found = _measured_metrics(file, columns, vehicle_class, **measured)
+    else:
+        found = _recorded_metrics(file, train, vehicle_class, columns, measured)
     if output is not None:
         output.write_text(found.to_json() + "\n", encoding="utf-8")
     show(metrics_table.metrics_table(found))
@@ -139,6 +167,58 @@ def _groups(train: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
             yield f"{prefix}{name}", f"{group['event'].shape[0]} events"
         else:
             yield from _groups(group, f"{prefix}{name}/")
+
+
+def _recorded_metrics(
+    file: Path,
+    train: int | None,
+    vehicle_class: VehicleClass | None,
+    columns: Sequence[str],
+    measured: dict[str, float | None],
+) -> Metrics:
+    """Indices of a result file, to which options of text files do not apply."""
+    from tiengine import result as results
+
+    given = [name for name, value in {"column": columns or None, **measured}.items() if value is not None]
+    if given:
+        raise InputError(f"--{given[0].replace('_', '-')}: only for text files ({', '.join(TEXT_FILES)}), not {file}")
+    with results.open(file) as result:
+        return result.metrics(train, vehicle_class=vehicle_class)
+
+
+def _measured_metrics(
+    file: Path,
+    columns: Sequence[str],
+    vehicle_class: VehicleClass | None,
+    *,
+    rate: float | None,
+    speed: float | None,
+    static_load: float | None,
+    run_in: float | None,
+) -> Metrics:
+    """Indices of measured signals."""
+    from tiengine.indices.measured_ride import measured_ride
+    from tiengine.indices.metrics import Metrics, train_metrics
+
+    pairs = [entry.partition("=") for entry in columns]
+    for signal, sign, column in pairs:
+        if not sign or not signal.strip() or not column.strip():
+            raise InputError(f"--column {signal}{sign}{column}: must be SIGNAL=COLUMN")
+    for name, value in (("rate", rate), ("speed", speed), ("static-load", static_load)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise InputError(f"--{name} {value:g}: must be a finite number > 0")
+    if run_in is not None and not 0.0 <= run_in < math.inf:
+        raise InputError(f"--run-in {run_in:g}: must be a finite number >= 0")
+    ride = measured_ride(
+        file,
+        {signal.strip(): column.strip() for signal, _, column in pairs},
+        rate=rate,
+        speed=None if speed is None else speed / 3.6,
+        run_in=run_in or 0.0,
+        static_load=None if static_load is None else 1e3 * static_load,
+        vehicle_class=vehicle_class,
+    )
+    return Metrics(str(file), (train_metrics(ride),), {})
 
 
 COMMANDS = (info, metrics, plot, report, export)

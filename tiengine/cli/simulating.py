@@ -80,6 +80,7 @@ def run(
         lambda **screen: simulate.run(resolved, path, force=force, workers=workers, checkpoint=checkpoint, **screen),
         path,
         resolved.name,
+        len(resolved.members),
         quiet,
     )
 
@@ -91,12 +92,18 @@ def run(
 @_quiet
 def resume(file: Path, workers: int | None, checkpoint: float, quiet: bool) -> None:
     """Resume an interrupted run: its result FILE becomes bit for bit that of an uninterrupted run."""
+    from tiengine import result as results
+
+    with results.open(file) as unfinished:
+        trains = len(unfinished.scenario.members)
+
     from tiengine.simulation import simulate
 
     _run_on_screen(
         lambda **screen: simulate.resume(file, workers=workers, checkpoint=checkpoint, **screen),
         file,
         file.stem,
+        trains,
         quiet,
     )
 
@@ -104,14 +111,14 @@ def resume(file: Path, workers: int | None, checkpoint: float, quiet: bool) -> N
 COMMANDS = (run, resume)
 
 
-def _run_on_screen(simulation: Callable[..., Result], path: Path, name: str, quiet: bool) -> None:
+def _run_on_screen(simulation: Callable[..., Result], path: Path, name: str, trains: int, quiet: bool) -> None:
     """Run a simulation with a progress bar and report its end."""
     from tiengine.parameters.errors import RunFailedError, RunStoppedError
 
     console = Console(stderr=True, quiet=quiet, highlight=False)
     with _stopped_by_signals(console) as stop:
         try:
-            with _progress(console, name) as progress:
+            with _progress(console, name, trains) as progress:
                 result = simulation(
                     progress=progress,
                     notify=lambda words: console.print(words, markup=False),
@@ -172,15 +179,15 @@ def _stopped_by_signals(console: Console) -> Iterator[_Stop]:
 
 
 @contextmanager
-def _progress(console: Console, name: str) -> Iterator[Callable[[float, float], None]]:
-    """Progress bar with simulated time, remaining time and real-time factor, as the callback of a run."""
+def _progress(console: Console, name: str, trains: int) -> Iterator[Callable[[float, float], None]]:
+    """Progress bar with simulated time (of all trains), remaining time and real-time factor, as callback of a run."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.completed:.2f} of {task.total:.2f} s"),
         TextColumn("ETA"),
         TimeRemainingColumn(),
-        TextColumn("RTF {task.fields[factor]:.2f}"),
+        TextColumn("RTF {task.fields[factor]:.2f}" + (" per train" if trains > 1 else "")),
     )
     bar = Progress(*columns, console=console, transient=not console.is_terminal)
     task = bar.add_task(name, total=0.0, factor=0.0, start=False)

@@ -1,64 +1,35 @@
-"""Placement of point lists in the frame of profiles: orientation, origin, smoothness.
+"""Placement of point lists in the frame of profiles: orientation, origin, inclination.
 
 Orientation follows from the shape: a rail's head is highest in the middle; a wheel's flange protrudes most and lies
 inside. The inner side of a symmetric railhead cannot be detected; y is taken as outward unless ``mirror`` is stated.
-
-A kink is a turn of the surface between the 1 mm before a point and the 1 mm after it. On a radius R it is 1 mm/R: 0.08
-at a gauge corner of R13 or a flange root of R12, 0.2 on R5, the limit for a running surface. A single point 0.1 mm off
-a smooth curve makes the same turn, rounding to 0.01 mm a tenth of it.
+What the shape contradicts is refused until it is stated: a wheel whose height is not zero at y = 0 may count from
+elsewhere than its tape circle; a railhead that is inclined leans towards its inner side.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline, make_smoothing_spline
 
+from tiengine.contact.point_list import FEWEST_POINTS, Kind, Placement, PointList, flange_tip
+from tiengine.contact.smoothing import increasing_run, smoothing_curve
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 
-__all__ = [
-    "FEWEST_POINTS",
-    "Kind",
-    "PointList",
-    "check_kinks",
-    "increasing_run",
-    "oriented",
-    "placed",
-    "smoothing_curve",
-]
+__all__ = ["mirrored", "oriented", "placed"]
 
-Kind = Literal["wheel", "rail"]
-
-FEWEST_POINTS = 10
-KINK_WINDOW = 1.0  # mm
-KINK_TURN, KINK_CURVATURE = 0.12, 0.08  # rad and rad/mm: together 0.2 over the window, more where points are sparser
-FLANGE_HEIGHT = 15.0  # mm above the tread, at least; new flanges have 27 to 30
 FLANGE_TIP = (-75.0, -35.0)  # mm from the tape circle; 70 mm from the flange's back, its tip some 15 mm
-FIELD_SIDE = 55.0  # mm from the tape circle: chamfers beyond are not part of the running surface
-HEAD_DEPTH = 20.0  # mm below the top: a rail's side below is not part of the running surface
 UNEVEN_DEPTH = 5.0  # mm by which the points may reach deeper on the outer side than on the inner one
 ORIGIN = 1e-3  # mm: a smaller offset of the origin is rounding of the list
+ORIGIN_HEIGHT = 0.03  # mm: a wheel's height at its tape circle may be off by the noise of a measurement
+HEAD_INCLINATION = 1.0 / 80.0  # of the head at the list's y = 0: half of the smallest inclination of rails, 1:40
+MIDDLE_INCLINATION = 1.0 / 60.0  # of the head's middle, which uneven sides move by a few mm on R300
+HEAD_LEVEL = 10.0  # mm below the top, where the middle of a railhead is taken
+HEAD_CHORD = 10.0  # mm to either side of the middle, over which its inclination is measured
+SHALLOW = 3.0  # mm: heads that reach less deep below their top are too flat to tell their inclination
 RESAMPLED_STEP = 0.1  # mm
 LARGEST = 1e4  # mm
-
-
-@dataclass(frozen=True, eq=False)
-class PointList:
-    """Points of a file.
-
-    Attributes:
-        points: y and z [mm], shape (n, 2).
-        lines: Line of each point in its file, shape (n,).
-        where: Name of the profile for messages.
-    """
-
-    points: Reals
-    lines: NDArray[np.int64]
-    where: str
 
 
 def oriented(listed: PointList, kind: Kind) -> PointList:
@@ -77,7 +48,7 @@ def oriented(listed: PointList, kind: Kind) -> PointList:
         middle = z[np.argmin(np.abs(y - 0.5 * (y.min() + y.max())))]
         if 0.5 * (z[0] + z[-1]) < middle:
             points[:, 1] *= -1.0
-    elif (tip := _flange_tip(z)) is not None:
+    elif (tip := flange_tip(z)) is not None:
         if z[tip] < np.median(z):
             points[:, 1] *= -1.0
         if y[tip] > 0.5 * (y.min() + y.max()):
@@ -87,131 +58,143 @@ def oriented(listed: PointList, kind: Kind) -> PointList:
     return replace(listed, points=points + 0.0, lines=lines)  # no -0.0
 
 
-def _flange_tip(z: Reals) -> int | None:
-    """Index of the point that protrudes most, preferably not an end of the list; None without a flange."""
-    height = z - np.median(z)
-    tall = [int(i) for i in (np.argmax(height), np.argmin(height)) if abs(height[i]) >= FLANGE_HEIGHT]
-    return max(tall, key=lambda i: (0 < i < z.size - 1, abs(height[i])), default=None)
-
-
-def check_kinks(listed: PointList, kind: Kind) -> None:
-    """Refuse a running surface that is not smooth.
-
-    The flange's back and tip, the outer rim and a rail's sides are not checked: they never touch and may have edges.
+def mirrored(listed: PointList, kind: Kind, stated: Placement) -> PointList:
+    """Mirror a rail whose gauge face is stated to be at positive y.
 
     Args:
         listed: Oriented points.
         kind: ``"wheel"`` or ``"rail"``.
+        stated: ``mirror`` is used.
 
     Raises:
-        InputError: A kink; the message names line, position and turn.
+        InputError: ``mirror`` is stated of a wheel.
     """
-    points = listed.points
-    chord = np.hypot(*np.diff(points, axis=0).T)
-    t = np.concatenate([[0.0], np.cumsum(chord)])
-    rank = np.arange(t.size)
-    before = np.minimum(np.searchsorted(t, t - KINK_WINDOW, side="right") - 1, rank - 1)
-    after = np.maximum(np.searchsorted(t, t + KINK_WINDOW, side="left"), rank + 1)
-    i = rank[(before >= 0) & (after < t.size)]
-    first, second = points[i] - points[before[i]], points[after[i]] - points[i]
-    turn = np.arctan2(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0], (first * second).sum(axis=1))
-    bound = KINK_TURN + KINK_CURVATURE * 0.5 * (np.hypot(*first.T) + np.hypot(*second.T))
-    excess = np.where(_is_run_on(points, kind)[i], np.abs(turn) / bound, 0.0)
-    if excess.size and excess.max() > 1.0:
-        worst = int(np.argmax(excess))
-        y, z = points[i[worst]]
-        raise InputError(
-            f"{listed.where}: line {listed.lines[i[worst]]}: a kink of {np.degrees(abs(turn[worst])):.0f} deg within"
-            f" {KINK_WINDOW:g} mm at y = {y:.2f} mm, z = {z:.2f} mm; a smooth surface, rounder than R5, expected"
-        )
+    if not stated.mirror:
+        return listed
+    if kind == "wheel":
+        raise InputError(f"{listed.where}: mirror = true: only for rails; a wheel is turned by its flange")
+    return replace(listed, points=listed.points[::-1] * [-1.0, 1.0], lines=listed.lines[::-1])
 
 
-def _is_run_on(points: Reals, kind: Kind) -> NDArray[np.bool_]:
-    """Points that may touch, shape (n,)."""
-    y, z = points.T
-    if kind == "rail":
-        return np.asarray(z < z.min() + HEAD_DEPTH)
-    tip = _flange_tip(z)
-    if tip is None:
-        return np.ones(y.size, dtype=np.bool_)
-    tape_circle = y[tip] + 55.0  # near enough for the rim
-    return np.asarray((y > y[tip] + 2.0) & (y < tape_circle + FIELD_SIDE))
-
-
-def placed(
-    points: Reals,
-    kind: Kind,
-    where: str,
-    *,
-    has_cant: bool = False,
-    smoothing: float = 0.0,
-    mirror: bool | None = None,
-    tape_circle: float = 0.0,
-) -> Reals:
+def placed(listed: PointList, kind: Kind, stated: Placement) -> Reals:
     """Move points to the origin of profiles, with y increasing throughout.
 
     Lists whose y falls somewhere (overhanging sides, noise of a measurement on a steep flank) are replaced by equal
     steps along their smoothing spline, as far to either side as y increases.
 
     Args:
-        points: y and z, oriented [mm], shape (n, 2).
+        listed: Oriented points.
         kind: ``"wheel"`` or ``"rail"``.
-        where: Name of the profile for messages.
-        has_cant: The points are those of an inclined rail, which is not moved.
-        smoothing: Length of the smoothing spline [m].
-        mirror: Whether a rail's gauge face is at positive y; None if not stated.
-        tape_circle: Distance of a wheel's tape circle outward from the list's y = 0 [m].
+        stated: Statements of the user; a rail stated to be inclined is not moved.
 
     Returns:
         y and z [m], shape (m, 2).
 
     Raises:
-        InputError: Too few or too large points, or a flange or side of a rail at an impossible place.
+        InputError: Too few or too large points, or a shape that contradicts what is stated or assumed.
     """
+    where, points = listed.where, mirrored(listed, kind, stated).points
     if len(points) < FEWEST_POINTS or not (np.abs(points) < LARGEST).all():
         raise InputError(
             f"{where}: {len(points)} points up to {np.abs(points).max(initial=0.0):g} mm; at least {FEWEST_POINTS}"
             f" finite pairs below {LARGEST:g} mm expected"
         )
-    if mirror:
-        if kind == "wheel":
-            raise InputError(f"{where}: mirror = true: only for rails; a wheel is turned by its flange")
-        points = points[::-1] * [-1.0, 1.0]
-    if len(points) > 1 and (np.diff(points[:, 0]) <= 0.0).any():
-        points = _resampled(points, max(1e3 * smoothing, 0.5 * RESAMPLED_STEP), kind, tape_circle)
-    placed = _placed_wheel(points, where, tape_circle) if kind == "wheel" else _placed_rail(points, where, mirror)
-    return (points if has_cant else placed) * 1e-3
+    tape_circle = 1e3 * (stated.tape_circle or 0.0)
+    if kind == "wheel":
+        _check_tape_circle(points, where, tape_circle)
+    if (np.diff(points[:, 0]) <= 0.0).any():
+        points = _resampled(points, max(1e3 * stated.smoothing, 0.5 * RESAMPLED_STEP), kind, tape_circle)
+    if len(points) < FEWEST_POINTS:
+        raise InputError(f"{where}: y increases over {len(points)} points only; at least {FEWEST_POINTS} expected")
+    if kind == "wheel":
+        return _placed_wheel(points, where, stated) * 1e-3
+    rail = _placed_rail(points, where, stated)
+    return (points if stated.has_cant else rail) * 1e-3
 
 
-def _placed_wheel(points: Reals, where: str, tape_circle: float) -> Reals:
-    """A wheel with the origin at its tape circle [mm]."""
-    moved = points - [1e3 * tape_circle, 0.0]
-    y, z = moved.T
-    if not y[0] < 0.0 < y[-1]:
-        raise InputError(
-            f"{where}: y from {y[0]:.2f} to {y[-1]:.2f} mm; the tape circle, y = 0, must lie between:"
-            " state tape_circle, its distance outward from the list's y = 0"
-        )
-    tip = _flange_tip(z)
+def _check_tape_circle(points: Reals, where: str, tape_circle: float) -> None:
+    """Refuse a tape circle [mm] that does not lie on the tread."""
+    y, z = points[:, 0] - tape_circle, points[:, 1]
+    tip = flange_tip(z)
     if tip is not None and not FLANGE_TIP[0] <= y[tip] <= FLANGE_TIP[1]:
         raise InputError(
             f"{where}: the flange's tip lies at y = {y[tip]:.2f} mm; {FLANGE_TIP[0]:g} to {FLANGE_TIP[1]:g} mm from"
             " the tape circle expected: state tape_circle, its distance outward from the list's y = 0"
+            " (0.07 where y counts from the flange's back)"
         )
-    height = float(np.interp(0.0, y, z))
+    if not y.min() < 0.0 < y.max():
+        raise InputError(
+            f"{where}: y from {y.min():.2f} to {y.max():.2f} mm; the tape circle, y = 0, must lie between:"
+            " state tape_circle, its distance outward from the list's y = 0"
+        )
+
+
+def _placed_wheel(points: Reals, where: str, stated: Placement) -> Reals:
+    """A wheel with the origin at its tape circle [mm]."""
+    moved = points - [1e3 * (stated.tape_circle or 0.0), 0.0]
+    if not moved[0, 0] < 0.0 < moved[-1, 0]:
+        raise InputError(
+            f"{where}: y increases from {moved[0, 0]:.2f} to {moved[-1, 0]:.2f} mm only; the tape circle, y = 0, must"
+            " lie between: state tape_circle, its distance outward from the list's y = 0"
+        )
+    height = float(np.interp(0.0, moved[:, 0], moved[:, 1]))
+    if stated.tape_circle is None and abs(height) > ORIGIN_HEIGHT:
+        raise InputError(
+            f"{where}: z = {height:.3f} mm at y = 0, which would be 0 at the tape circle: state tape_circle, its"
+            " distance outward from the list's y = 0 (0 if it is there and z counts from elsewhere)"
+        )
     return moved - [0.0, height] if abs(height) > ORIGIN else moved
 
 
-def _placed_rail(points: Reals, where: str, mirror: bool | None) -> Reals:
+def _placed_rail(points: Reals, where: str, stated: Placement) -> Reals:
     """A rail with the top of its head at z = 0 [mm]."""
     top = float(points[:, 1].min())
     inner, outer = points[0, 1] - top, points[-1, 1] - top
-    if mirror is None and outer > inner + UNEVEN_DEPTH:
+    slope = _head_slope(points)
+    if slope:
+        side = "negative" if slope < 0.0 else "positive"
+        leans = f"{where}: the head is inclined by 1:{1.0 / abs(slope):.0f} towards {side} y"
+        if stated.has_cant is None:
+            hint = "" if slope < 0.0 or stated.mirror is not None else " and mirror = true"
+            raise InputError(
+                f"{leans}: state has_cant = true{hint} if the points are those of a rail inclined in the track, else"
+                " has_cant = false"
+            )
+        if slope > 0.0 and stated.has_cant and stated.mirror is None:
+            raise InputError(
+                f"{leans}, a rail in the track towards its gauge face: state mirror = true if that is at positive y,"
+                " else mirror = false"
+            )
+    if stated.mirror is None and outer > inner + UNEVEN_DEPTH:
         raise InputError(
             f"{where}: reaches {inner:.1f} mm below its top at negative y, the inner side, and {outer:.1f} mm at"
             " positive y: state mirror = true if its gauge face is at positive y, else mirror = false"
         )
     return points - [0.0, top] if abs(top) > ORIGIN else points
+
+
+def _head_slope(points: Reals) -> float:
+    """Slope dz/dy of an inclined railhead; 0 if it stands upright or is too shallow to tell.
+
+    An inclined head falls towards its inner side in its middle and at its crown, which is y = 0 in drawings; its
+    highest point lies outward by R times the inclination.
+    """
+    y, z = points.T
+    top = int(np.argmin(z))
+    level = min(HEAD_LEVEL, z[0] - z[top], z[-1] - z[top])
+    if level < SHALLOW:
+        return 0.0
+    inner = np.flatnonzero(z[: top + 1] >= z[top] + level)[-1]
+    outer = top + np.flatnonzero(z[top:] >= z[top] + level)[0]
+    middle, half = 0.5 * float(y[inner] + y[outer]), min(HEAD_CHORD, 0.3 * float(y[outer] - y[inner]))
+
+    def slope(place: float) -> float:
+        low, high = np.interp([place - half, place + half], y, z)
+        return float(high - low) / (2.0 * half)
+
+    if abs(slope(middle)) > MIDDLE_INCLINATION:
+        return slope(middle)
+    return slope(0.0) if abs(middle) < HEAD_CHORD and abs(slope(0.0)) > HEAD_INCLINATION else 0.0
 
 
 def _resampled(points: Reals, smoothing: float, kind: Kind, tape_circle: float) -> Reals:
@@ -220,30 +203,11 @@ def _resampled(points: Reals, smoothing: float, kind: Kind, tape_circle: float) 
     curve = smoothing_curve(points[apart], smoothing)
     t = np.linspace(curve.x[0], curve.x[-1], int(curve.x[-1] / RESAMPLED_STEP) + 2)
     fine = curve(t)
-    inside = np.argmin(fine[:, 1]) if kind == "rail" else np.argmin(np.abs(fine[:, 0] - 1e3 * tape_circle))
-    first, last = increasing_run(fine[:, 0], int(inside), 1e-6)
+    if kind == "rail":
+        inside = int(np.argmin(fine[:, 1]))
+    else:
+        tip = flange_tip(fine[:, 1]) or 0
+        inside = tip + int(np.argmin(np.abs(fine[tip:, 0] - tape_circle)))
+    first, last = increasing_run(fine[:, 0], inside, 1e-6)
     kept: Reals = fine[first:last]
     return kept
-
-
-def smoothing_curve(points: Reals, smoothing: float) -> CubicSpline:
-    """The smooth curve (y, z) through points over their chord length.
-
-    Args:
-        points: Shape (n, 2).
-        smoothing: Length l of the smoothing spline in the points' unit; 0 for interpolation.
-    """
-    t = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(points[:, 0]), np.diff(points[:, 1])))])
-    smooth = points.copy()
-    if smoothing > 0.0:
-        scaled = t / smoothing
-        for column in smooth.T:
-            column[:] = make_smoothing_spline(scaled, column, np.gradient(scaled), lam=1.0)(scaled)
-    return CubicSpline(t, smooth, bc_type="natural")
-
-
-def increasing_run(y: Reals, inside: int, rounding: float = 1e-9) -> tuple[int, int]:
-    """The slice [first, last) around index ``inside`` over which y increases by more than ``rounding``."""
-    falls = np.flatnonzero(np.diff(y) <= rounding)
-    before, after = falls[falls < inside], falls[falls >= inside]
-    return (int(before[-1]) + 1 if before.size else 0), (int(after[0]) + 1 if after.size else y.size)

@@ -68,18 +68,18 @@ def find_contacts(wheel: Profile, rail: Profile, offset: float, u: ArrayLike, al
     shift, tilt = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(alpha, dtype=np.float64))
     flat_u, flat_alpha = shift.ravel() + offset, tilt.ravel()
     case, station = _candidates(wheel, rail, flat_u, flat_alpha)
-    station = _refine(wheel, rail, flat_u[case], flat_alpha[case], station)
-    o, z = _placed(wheel, flat_u[case], flat_alpha[case], station)
-    F = z - rail.height(o)
-    order = np.lexsort((F, case))
-    best = order[np.append(np.diff(case[order]) > 0, True)]  # the last of each case has the largest F
-    if best.size < flat_u.size:
+    if np.unique(case).size < flat_u.size:
         lost = np.setdiff1d(np.arange(flat_u.size), case)[0]
         raise InputError(
             f"wheel {wheel.name!r} on rail {rail.name!r}: no contact inside both profiles at "
             f"u = {shift.ravel()[lost] * 1e3:.2f} mm, alpha = {flat_alpha[lost] * 1e3:.2f} mrad; "
             "longer profiles or a narrower range of u expected"
         )
+    station = _refine(wheel, rail, flat_u[case], flat_alpha[case], station)
+    o, z = _placed(wheel, flat_u[case], flat_alpha[case], station)
+    F = z - rail.height(o)
+    order = np.lexsort((F, case))
+    best = order[np.append(np.diff(case[order]) > 0, True)]  # the last of each case has the largest F
     return Contacts(
         gap=-F[best].reshape(shift.shape),
         s_w=station[best].reshape(shift.shape),

@@ -36,6 +36,10 @@ STEPS_PER_SIGMA = 4.0
 """Least sampling of the Gaussian: a contact jump is placed to sigma/8."""
 SMALLEST_CURVATURE = 0.02
 """Floor of the transverse curvature [1/m], a 25 m radius: profiles that fit closely over the whole patch."""
+FLANGE_DEPTH = 10e-3
+"""Depth below the tape circle where a flange's thickness is measured [m]."""
+LARGEST_CLEARANCE = 40e-3
+"""Largest clearance of a flange [m]: 22 mm thick, worn, on a track 20 mm wide."""
 
 
 class ContactSettings(Params):
@@ -60,7 +64,9 @@ class ContactSettings(Params):
         float,
         Q("m", "step in u; at 0.05 mm the slope of g misses tan gamma by 0.5 % at the flange root", gt=0, le=5e-5),
     ] = 0.025e-3
-    alpha_max: Annotated[float, Q("rad", "largest tilt", gt=0, le=0.1)] = 6e-3
+    alpha_max: Annotated[
+        float, Q("rad", "largest tilt; a wheel on its flange rolls the wheelset by up to 10 mrad", gt=0, le=0.1)
+    ] = 12e-3
     dalpha: Annotated[float, Q("rad", "step in alpha", gt=0)] = 0.25e-3
 
     def axis(self, axis: Literal["u", "alpha"]) -> Reals:
@@ -148,10 +154,25 @@ class WheelRailPair:
     settings: ContactSettings
 
     def __post_init__(self) -> None:
-        """Refuse a rail in the wheel's place."""
+        """Refuse a rail in the wheel's place, and a gauge that does not fit the wheelset."""
         for place, profile in (("wheel", self.wheel), ("rail", self.rail)):
             if profile.kind != place:
                 raise InputError(f"profile {profile.name!r} is that of a {profile.kind}; a {place} profile expected")
+
+        clearance, fit = self.flange_clearance, LARGEST_CLEARANCE
+        if clearance is not None and not 0.0 < clearance <= fit:
+            raise InputError(
+                f"gauge = {self.settings.gauge:g} m does not fit wheel {self.wheel.name!r} with tape circles"
+                f" {2.0 * self.settings.half_spacing:g} m apart: {clearance * 1e3:.1f} mm between flange and gauge"
+                f" face, 0 to {fit * 1e3:g} mm expected; state track.gauge or the vehicle's half_span_contact"
+                " (tiengine contact: --gauge, --half-spacing)"
+            )
+
+    @cached_property
+    def flange_clearance(self) -> float | None:
+        """Shift of the centred wheelset until a flange meets its gauge face [m]; None for a wheel without a flange."""
+        face = self.wheel.flange_face(FLANGE_DEPTH)
+        return None if face is None else 0.5 * self.settings.gauge - (self.settings.half_spacing + face)
 
     @cached_property
     def canted_rail(self) -> Profile:

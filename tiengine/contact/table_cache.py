@@ -16,19 +16,17 @@ from zipfile import BadZipFile
 
 import numpy as np
 import scipy
-from platformdirs import user_cache_path
 
-from tiengine.contact import hertz, kalker, profile, profile_frame
+from tiengine.contact import hertz, kalker, profile, smoothing
 from tiengine.contact import search as contact_search
 from tiengine.contact import table as contact_geometry
 from tiengine.contact.profile import Profile
 from tiengine.contact.table import ContactSettings, ContactTable, build_contact_table
+from tiengine.parameters.cache_folders import table_folder
 
 __all__ = ["contact_table"]
 
-FOLDER = "TIENGINE_CACHE"
-"""Environment variable that overrides the cache folder."""
-MODULES: tuple[ModuleType, ...] = (contact_geometry, contact_search, hertz, kalker, profile, profile_frame)
+MODULES: tuple[ModuleType, ...] = (contact_geometry, contact_search, hertz, kalker, profile, smoothing)
 FIELDS = ("u_min", "du", "alpha_min", "dalpha", "crown_offset")
 
 
@@ -46,7 +44,7 @@ def contact_table(wheel: Profile, rail: Profile, settings: ContactSettings) -> C
     Raises:
         InputError: As :func:`tiengine.contact.table.build_contact_table`.
     """
-    path = _folder() / f"contact-{_digest(wheel, rail, settings)}.npz"
+    path = table_folder() / f"contact-{_digest(wheel, rail, settings)}.npz"
     with contextlib.suppress(OSError, ValueError, KeyError, EOFError, BadZipFile), open(path, "rb") as file:
         kept = np.load(file, allow_pickle=False)
         numbers = dict(zip(FIELDS, kept["numbers"].tolist(), strict=True))
@@ -55,11 +53,6 @@ def contact_table(wheel: Profile, rail: Profile, settings: ContactSettings) -> C
     with contextlib.suppress(OSError):
         _write(path, table)
     return table
-
-
-def _folder() -> Path:
-    """Folder of the cache."""
-    return Path(os.environ[FOLDER]) if os.environ.get(FOLDER) else user_cache_path("tiengine")
 
 
 def _digest(wheel: Profile, rail: Profile, settings: ContactSettings) -> str:

@@ -10,6 +10,8 @@ from typing import Any
 import taichi as ti
 from taichi.lang.ast import ast_transformer_utils
 
+from tiengine.parameters.cache_folders import ensure_cache_folders, kernel_cache
+
 _started: dict[str, float] = {}
 
 
@@ -25,6 +27,7 @@ def start(threads: int = 1, debug: bool = False) -> float:
     """
     if not _started:
         clock = time.perf_counter()
+        ensure_cache_folders()
         if not debug:
             _forget_source_positions()
         with contextlib.redirect_stdout(io.StringIO()):  # ti.init prints a line whatever the log level
@@ -35,8 +38,8 @@ def start(threads: int = 1, debug: bool = False) -> float:
                 fast_math=not debug,
                 debug=debug,
                 cpu_max_num_threads=threads,
-                offline_cache=True,
                 log_level=ti.WARN,
+                **kernel_cache(),
             )
         _started["seconds"] = time.perf_counter() - clock
     return _started["seconds"]

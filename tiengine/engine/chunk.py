@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tiengine.kernels import layout as at
-from tiengine.model.model import Ingredients
+from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
 
 __all__ = ["Chunk"]

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.static_track import StaticTrack
+from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
+from tiengine.engine.steady import Track, steady_track
 from tiengine.engine.window import window_clock
 from tiengine.kernels import contact as kernels
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import N_CONTACT
-from tiengine.model.model import Model
+from tiengine.model.constant_data import Model
 from tiengine.parameters.errors import InputError
 
 __all__ = ["ContactForces", "equilibrium", "evaluate_contact", "release"]
@@ -88,12 +88,12 @@ def evaluate_contact(
     return out
 
 
-def equilibrium(model: Model, state: SineState, X: float, V: float, V_rate: float = 0.0) -> None:
+def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 0.0) -> None:
     """Put all trains of a state into steady rolling on a smooth track.
 
     Args:
         model: Constant data.
-        state: Written: rows U, V, A, the contact's forces, the slabs under the window.
+        state: Written: displacements and velocities, the contact's forces, the slabs under the window.
         X: Chainage of the window's rear end [m].
         V: Speed [m/s].
         V_rate: Its rate [m/s^2].
@@ -101,25 +101,21 @@ def equilibrium(model: Model, state: SineState, X: float, V: float, V_rate: floa
     Raises:
         InputError: Newton's method found no equilibrium.
     """
-    clock = window_clock(model.ingredients.slab, np.array([X]), np.array([V]), np.array([V_rate]))[0]
-    state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
-    track = StaticTrack(model, state, float(clock[at.FIRST_SEAT_S]), V)
+    track = steady_track(model, state, _enter(model, state, X), V)
     problem = _Problem(model, track, V, V_rate)
     y = problem.solve()
     x, rates, rail_force = problem.split(y[None])
-    rails, slabs = track.motion(rail_force[0])
-    n = int(model.dims[at.MODES])
-    for row, values in ((at.U, x[0]), (at.V, problem.spread(rates[0]))):
-        state.view(row, "vehicles")[:] = values
-    state.view(at.U, "vertical")[:] = rails[:, : 2 * n]
-    state.view(at.U, "lateral")[:] = rails[:, 2 * n :]
-    state.view(at.U, "slabs")[:] = slabs
+    vertical, lateral, slabs = track.motion(rail_force[0])
+    state.put(DISPLACEMENT, "vehicles", x[0])
+    state.put(VELOCITY, "vehicles", problem.spread(rates[0]))
+    state.put(DISPLACEMENT, "vertical", vertical)
+    state.put(DISPLACEMENT, "lateral", lateral)
+    state.put(DISPLACEMENT, "slabs", slabs)
     forces = problem.contact(y[None])
-    state.force[:], state.contact[:] = forces.local, forces.contact
-    state.wheelset_force[:], state.rail_force[:] = forces.wheelset, forces.rail
+    state.put_contact(forces.contact, forces.local, forces.wheelset, forces.rail)
 
 
-def release(model: Model, state: SineState, X: float) -> None:
+def release(model: Model, state: State, X: float) -> None:
     """Put all trains onto the track without load, as the paper does: all zero but the weight's acceleration.
 
     Args:
@@ -127,17 +123,25 @@ def release(model: Model, state: SineState, X: float) -> None:
         state: Written.
         X: Chainage of the window's rear end [m].
     """
-    clock = window_clock(model.ingredients.slab, np.array([X]), np.zeros(1), np.zeros(1))[0]
-    state.enter(model, int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
-    n = model.ingredients.train.n_dof
-    mass = np.diag(model.ingredients.train.M)
-    state.view(at.A, "vehicles")[:, :n] = model.ingredients.train.gravity[:n] / mass[:n]
+    _enter(model, state, X)
+    train = model.ingredients.train
+    falling = np.zeros(train.n)
+    falling[: train.n_dof] = train.gravity[: train.n_dof] / np.diag(train.M)[: train.n_dof]
+    state.put(ACCELERATION, "vehicles", falling)
+
+
+def _enter(model: Model, state: State, X: float) -> float:
+    """Let in seats and slabs under a window whose rear end is at X [m]; place of the rear seat in it [m]."""
+    g = model.ingredients
+    clock = window_clock(g.slab, np.array([X]), np.zeros(1), np.zeros(1), g.seat_reach)[0]
+    state.enter(int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB]))
+    return float(clock[at.FIRST_SEAT_S])
 
 
 class _Problem:
     """Residual of steady rolling: train (n), then contact forces on the rails (6 W)."""
 
-    def __init__(self, model: Model, track: StaticTrack, V: float, V_rate: float) -> None:
+    def __init__(self, model: Model, track: Track, V: float, V_rate: float) -> None:
         self.model, self.track, self.V = model, track, V
         self.train = model.ingredients.train
         self.pitch = self.train.wheelset_dof[:, 3]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.kernels import layout as at
-from tiengine.model.model import Model
+from tiengine.model.sine_model import SineModel
 
 __all__ = ["Scratch"]
 
@@ -50,7 +50,7 @@ class Scratch:
     rail_predicted: NDArray[np.float64]
 
     @classmethod
-    def of(cls, model: Model, body_rows: int) -> Scratch:
+    def of(cls, model: SineModel, body_rows: int) -> Scratch:
         """Zeros of the model's sizes, for a chunk with some records of the bodies."""
         sizes = (at.TRAINS, at.MODES, at.SEATS, at.WHEELSETS, at.SLOTS, at.SLAB_DOFS, at.SEATS_PER_SLAB)
         B, N, seats, W, slots, dofs, per_slab = (int(model.dims[size]) for size in sizes)

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
 from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import COS, N_CONTACT, SHIFT
-from tiengine.model.model import Model
+from tiengine.model.sine_model import SineModel
 from tiengine.parameters.arrays import Reals
-from tiengine.track.rail import RailWindow
 
 __all__ = ["SineState"]
 
@@ -28,7 +27,7 @@ class SineState(State):
     """Arrays that a step changes; B trains, W wheelsets, shapes as the kernels read them.
 
     Attributes:
-        window: Trial functions of the rails.
+        model: Constant data.
         motion: Rows of generalised coordinates, see ``layout``.
         seat_scale: Factors of the fastenings in the window, shape (B, seats, 2).
         design: Design of the slab in each slot, shape (B, slots).
@@ -39,7 +38,7 @@ class SineState(State):
         first_seat, first_slab: Rear seat and slab of the window.
     """
 
-    window: RailWindow
+    model: SineModel
     motion: NDArray[np.float64]
     seat_scale: NDArray[np.float64]
     design: NDArray[np.int32]
@@ -56,7 +55,7 @@ class SineState(State):
     _bodies: slice = field(default_factory=lambda: slice(None))
 
     @classmethod
-    def at_rest(cls, model: Model) -> SineState:
+    def at_rest(cls, model: SineModel) -> SineState:
         """All zero: nothing moves, no forces."""
         d = model.dims
         B, n, seats, W = int(d[at.TRAINS]), int(d[at.MODES]), int(d[at.SEATS]), int(d[at.WHEELSETS])
@@ -69,7 +68,7 @@ class SineState(State):
             "vehicles": (slice(int(d[at.VEHICLES]), columns), (B, vehicle)),
         }
         return cls(
-            window=model.window,
+            model=model,
             motion=np.zeros((at.MOTION_ROWS, columns)),
             seat_scale=np.ones((B, seats, 2)),
             design=np.zeros((B, slots), dtype=np.int32),
@@ -119,7 +118,7 @@ class SineState(State):
 
     def rail_motion(self, side: int, s: float) -> Reals:
         """Motion of a rail at a place in the window, shape (2, 3, 3, B)."""
-        n, k = self.window.modes, self.window.wave_numbers
+        n, k = self.model.window.modes, self.model.window.wave_numbers
         sine, cosine = np.sin(k * s), np.cos(k * s)
         shapes = np.stack([sine, k * cosine, -(k**2) * sine], axis=1)
         found = np.empty((2, len(ROWS), 3, self.trains))
@@ -130,7 +129,7 @@ class SineState(State):
 
     def rail_deflection(self, s: Reals) -> Callable[[], Reals]:
         """Bind the vertical deflection of both rails to fixed places in the window."""
-        shape, rails = self.window.shape(s).T, self.view(at.U, "vertical")[..., : self.window.modes]
+        shape, rails = self.model.window.shape(s).T, self.view(at.U, "vertical")[..., : self.model.window.modes]
         return lambda: np.asarray(rails @ shape)
 
     def squares(self) -> tuple[float, float, float]:
@@ -152,6 +151,15 @@ class SineState(State):
         columns, shape = self._blocks[block]
         return self.motion[row, columns].reshape(shape)
 
+    def put(self, kind: int, name: str, values: Reals) -> None:
+        """Fill the coordinates of a part of all trains, or their rates."""
+        self.view(ROWS[kind], name)[:] = values
+
+    def put_contact(self, contact: Reals, local: Reals, wheelset: Reals, rail: Reals) -> None:
+        """Take over contact states and forces, from which the next solve starts."""
+        self.force[:], self.contact[:] = local, contact
+        self.wheelset_force[:], self.rail_force[:] = wheelset, rail
+
     def clear(self, train: int) -> None:
         """Take a train whose numbers ran away out of the way: nothing moves, no forces."""
         for row in ROWS.values():
@@ -161,23 +169,18 @@ class SineState(State):
             forces[train] = 0.0
         self.contact[train] = _first_contact(1, self.contact.shape[1])[0]
 
-    def enter(self, model: Model, first_seat: int, first_slab: int) -> None:
-        """Move the window on to its rear seat and slab: drop the slabs that it leaves, bring new ones in at rest.
-
-        Args:
-            model: Constant data.
-            first_seat: Index of the rear seat.
-            first_slab: Index of the rear slab.
-        """
+    def enter(self, first_seat: int, first_slab: int) -> None:
+        """Move the window on to its rear seat and slab: drop the slabs that it leaves, bring new ones in at rest."""
+        ingredients = self.model.ingredients
         if first_seat != self.first_seat:
-            self.seat_scale[:] = model.ingredients.seat_factors(first_seat, self.seat_scale.shape[1])
+            self.seat_scale[:] = ingredients.seat_factors(first_seat, self.seat_scale.shape[1])
             self.first_seat = first_seat
         if first_slab != self.first_slab:
             slots = self.design.shape[1]
             fresh = range(max(first_slab, self.first_slab + slots), first_slab + slots)
             for slab in fresh if self.first_slab >= 0 else range(first_slab, first_slab + slots):
                 slot = slab % slots
-                self.design[:, slot] = model.ingredients.designs.of_slab.get(slab, 0)
+                self.design[:, slot] = ingredients.designs.of_slab.get(slab, 0)
                 for row in ROWS.values():
                     self.view(row, "slabs")[:, slot] = 0.0
             self.first_slab = first_slab

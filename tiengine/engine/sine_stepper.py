@@ -17,7 +17,7 @@ from tiengine.engine.sine_state import SineState
 from tiengine.engine.stepper import Call, Stage, Stepper
 from tiengine.kernels import layout as at
 from tiengine.kernels import step as kernels
-from tiengine.model.model import Model
+from tiengine.model.sine_model import SineModel
 from tiengine.parameters.arrays import Reals
 
 __all__ = ["SineStepper"]
@@ -37,7 +37,9 @@ class SineStepper(Stepper):
 
     state: SineState
 
-    def __init__(self, model: Model, state: SineState, chunk: Chunk, *, parallel: bool = False, public: bool = False):
+    def __init__(
+        self, model: SineModel, state: SineState, chunk: Chunk, *, parallel: bool = False, public: bool = False
+    ):
         """Bind.
 
         Args:
@@ -254,7 +256,7 @@ class SineStepper(Stepper):
         window, V = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])), float(clock[at.SPEED])
         if window != self._window:  # the first step too: the start has let the first slabs in
             self._window = window
-            self.state.enter(self.model, *window)
+            self.state.enter(*window)
             self._odd = [(int(slot), int(self.state.design[0, slot])) for slot in np.flatnonzero(self.state.design[0])]
         factored = self.factored_speed
         if V != factored and not abs(V - factored) < REFACTOR * factored:

@@ -65,6 +65,19 @@ class State(ABC):
         Shape (B, 2 rails, 3, seats of the window from the rear).
         """
 
+    def widen(self, smallest: Reals, largest: Reals) -> None:
+        """Widen extremes in place by the seats' forces of the last step, or of all steps since the last call.
+
+        A recorder calls it after those steps at which :attr:`Stepper.seat_extremes_due` says so.
+
+        Args:
+            smallest: Shape as :attr:`seat_forces`.
+            largest: Same shape.
+        """
+        forces = self.seat_forces
+        np.minimum(smallest, forces, out=smallest)
+        np.maximum(largest, forces, out=largest)
+
     @abstractmethod
     def body_motion(self, kind: int) -> Reals:
         """Displacement, velocity or acceleration of the bodies, shape (B, 5 bodies) [m, rad and their rates].
@@ -122,6 +135,36 @@ class State(ABC):
 
         Returns:
             Shape (3, coordinates) for vehicles, (3, 2 rails, coordinates), (3, slots, coordinates) for slabs.
+        """
+
+    @abstractmethod
+    def put(self, kind: int, name: str, values: Reals) -> None:
+        """Fill the coordinates of a part of all trains, or their rates.
+
+        Args:
+            kind: ``DISPLACEMENT``, ``VELOCITY`` or ``ACCELERATION``.
+            name: One of ``PARTS``.
+            values: As :meth:`part` of one kind, with the trains as the first index or the same for all.
+        """
+
+    @abstractmethod
+    def put_contact(self, contact: Reals, local: Reals, wheelset: Reals, rail: Reals) -> None:
+        """Take over contact states and forces, from which the next solve starts.
+
+        Args:
+            contact: Contact states, shape (1 or B, W, 2, N_CONTACT).
+            local: N, Fx, Fy, Mz on the wheels, shape (..., W, 2, 4).
+            wheelset: Forces on y, z, roll, pitch, yaw, shape (..., W, 5).
+            rail: Forces on w, v, theta_x, shape (..., W, 2, 3).
+        """
+
+    @abstractmethod
+    def enter(self, first_seat: int, first_slab: int) -> None:
+        """Move the window on to its rear seat and slab: drop the slabs that it leaves, bring new ones in at rest.
+
+        Args:
+            first_seat: Index of the rear seat.
+            first_slab: Index of the rear slab.
         """
 
     @abstractmethod

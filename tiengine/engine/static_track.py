@@ -1,4 +1,4 @@
-"""Track under steady loads: d/dt = 0 in the moving frame, seats at their places at one instant.
+"""Track with rails in sines under steady loads: d/dt = 0 in the moving frame, seats at their places at one instant.
 
 Assembled from matrices on the host, independently of the kernels (which it also checks). A fastening's damper still
 responds to the convective rate -V d/ds. Slabs are eliminated one by one, since each is joined to the rails only.
@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from tiengine.engine.sine_state import SineState
 from tiengine.kernels import layout as at
-from tiengine.model.model import Model
+from tiengine.model.sine_model import SineModel
+from tiengine.parameters.arrays import Reals
+from tiengine.track.seat_points import mean_cosine
 
 __all__ = ["StaticTrack"]
 
@@ -22,7 +24,7 @@ __all__ = ["StaticTrack"]
 class StaticTrack:
     """Compliance of both rails on slabs; unknowns of a rail are w, theta_y, v, theta_z, theta_x, each N."""
 
-    def __init__(self, model: Model, state: SineState, first_seat_s: float, V: float, train: int = 0) -> None:
+    def __init__(self, model: SineModel, state: SineState, first_seat_s: float, V: float, train: int = 0) -> None:
         """Assemble and factorise.
 
         Args:
@@ -83,24 +85,26 @@ class StaticTrack:
         under: NDArray[np.float64] = np.einsum("wrfk,bk->bwrf", self._compliance, flat)
         return under
 
-    def motion(self, force: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def motion(self, force: Reals) -> tuple[Reals, Reals, Reals]:
         """Generalised coordinates under wheel forces.
 
         Args:
             force: Forces on w, v, theta_x at the wheels, shape (W, 2, 3).
 
         Returns:
-            Rails, shape (2, 5 N), and slabs by slot, shape (slots, dofs).
+            Vertical coordinates of the rails, shape (2, 2 N), lateral ones, shape (2, 3 N), and slabs by slot, shape
+            (slots, dofs).
         """
         return self.respond(self._place @ force.ravel())
 
-    def respond(self, load: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def respond(self, load: Reals) -> tuple[Reals, Reals, Reals]:
         """Generalised coordinates, as :meth:`motion`, under generalised forces on the rails, shape (10 N,)."""
         q = la.lu_solve(self._lu, load)
         slabs = np.zeros((self.model.ingredients.slots, int(self.model.dims[at.SLAB_DOFS])))
         for slot, lu, to_slab in self._slabs:
             slabs[slot] = -la.lu_solve(lu, to_slab @ q)
-        return q.reshape(2, -1), slabs
+        rails, n = q.reshape(2, -1), self.model.ingredients.modes
+        return rails[:, : 2 * n], rails[:, 2 * n :], slabs
 
     def _springs(self, state: SineState, s0: float, train: int) -> dict[int, _Springs]:
         """Springs of the seats in the window, by slab."""
@@ -109,7 +113,8 @@ class StaticTrack:
         j = np.arange(state.seat_scale.shape[1])
         s = np.asarray(s0 + j * d, dtype=np.float64)
         j = j[s < g.length]
-        phi, slope = self.model.window.shape(s[j]), self.model.window.shape_slope(s[j])
+        mean = mean_cosine(self.model.window.wave_numbers, g.fastening.length)
+        phi, slope = mean * self.model.window.shape(s[j]), mean * self.model.window.shape_slope(s[j])
         slab, seat = np.divmod(state.first_seat + j, per_slab)
         found = {}
         for k in np.unique(slab):
@@ -131,7 +136,7 @@ class _Springs:
 
 
 def _slab_springs(
-    model: Model,
+    model: SineModel,
     seat: NDArray[np.int64],
     scale: NDArray[np.float64],
     phi: NDArray[np.float64],

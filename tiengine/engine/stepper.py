@@ -18,7 +18,7 @@ from tiengine.engine.chunk import Chunk
 from tiengine.engine.state import State
 from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
-from tiengine.model.model import Ingredients
+from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
 
 __all__ = ["BETWEEN_STEPS", "Rows", "Stage", "Stepper"]
@@ -70,6 +70,11 @@ class Stepper(ABC):
         self.watchers: list[Stage] = []
         self._calls: tuple[Call, ...] = ()
         self._mark: Callable[[str], object] | None = None
+
+    @property
+    def seat_extremes_due(self) -> bool:
+        """Whether the extremes of the seats' forces must be taken from the state after this step; by default always."""
+        return True
 
     @abstractmethod
     def _stages(self) -> Iterator[Stage]:
@@ -131,7 +136,7 @@ class Stepper(ABC):
             V_rate: Its rate [m/s^2].
             irregularity: Track channels, shape (B, steps, W, N_IRREGULARITY).
         """
-        clock = window_clock(self.ingredients.slab, X, V, V_rate)
+        clock = window_clock(self.ingredients.slab, X, V, V_rate, self.ingredients.seat_reach)
         self.chunk.clock[: len(X)] = clock
         self.chunk.irregularity[:, : len(X)] = irregularity
         changes = np.diff(clock[:, [at.FIRST_SEAT, at.FIRST_SLAB, at.SPEED]], axis=0).any(axis=1)

@@ -7,13 +7,15 @@ from functools import lru_cache
 
 from tiengine.engine import backend
 from tiengine.engine.chunk import Chunk
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.stability import TOLERATED_GROWTH, energy_growth
-from tiengine.irregularity.irregularity import IrregularityParams, check_step, shortest_wavelength
+from tiengine.engine.vector_mode import lanes_for
+from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.track_checks import check_step, shortest_wavelength
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
+from tiengine.model.spline_model import DivergingPassesError
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario, check_wavelength, to_toml
 from tiengine.scenario.tables import Output
@@ -42,31 +44,34 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     wanted = scenario.numerics.time_step
     V = scenario.train.speed.at(scenario.rear + scenario.centre_in_window)[0]
     fastest = scenario.train.speed.fastest
-    jit = 0.0
+    jit, growth = 0.0, ""
     shortest = shortest_wavelength(scenario.irregularity)
     for dt in AUTO_STEPS if wanted == "auto" else (float(wanted),):
         try:
             check_wavelength(scenario, dt)
-            check_step(shortest, fastest, dt)
+            check_step(scenario.irregularity, shortest, fastest, dt)
         except InputError:
             if wanted == "auto" and dt != AUTO_STEPS[-1]:
                 continue
             raise
-        parts = replace(_ingredients(_Key.of(scenario)), newmark=Newmark(dt))
-        model = build_model(parts, fastest)
+        parts, lanes = replace(_ingredients(_Key.of(scenario)), newmark=Newmark(dt)), lanes_for(trains)
+        try:
+            model = build_model(parts, fastest)
+        except DivergingPassesError as error:
+            growth = str(error)
+            continue
         if jit == 0.0:
             chunk = Chunk.empty(parts, 1, 1, 1)
-            jit = SineStepper(model, SineState.at_rest(model), chunk, public=public_launch).compile()
-        growth = energy_growth(model, fastest)
-        if growth <= TOLERATED_GROWTH:
-            if trains > 1:
+            jit = make_stepper(model, state_at_rest(model, lanes), chunk, public=public_launch).compile()
+        found = energy_growth(model, fastest, lanes)
+        if found <= TOLERATED_GROWTH:
+            if trains > 1 or V != fastest:
                 model = build_model(replace(parts, trains=trains), V)
-            elif V != fastest:
-                model.refactor(V)
             return model, jit
+        growth = f"free vibration of the track grows by a factor {found:.3g} within 80 steps"
     raise InputError(
-        f"numerics.time_step = {wanted}: unstable; free vibration of the track grows by a factor {growth:.3g} within"
-        " 80 steps; choose a shorter step, more passes or fewer modes_per_metre"
+        f"numerics.time_step = {wanted}: unstable; {growth}; choose a shorter step, more passes or fewer"
+        " trial functions"
     )
 
 

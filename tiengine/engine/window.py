@@ -11,10 +11,10 @@ from tiengine.track.slab import Slab
 __all__ = ["window_clock"]
 
 
-def window_clock(slab: Slab, X: Reals, V: Reals, V_rate: Reals) -> Reals:
+def window_clock(slab: Slab, X: Reals, V: Reals, V_rate: Reals, reach: float = 0.0) -> Reals:
     """Position of the window over seats and slabs at a row of instants.
 
-    Seat j is at chainage (j + 1/2) d and enters at s = l; the rear seat has 0 < s_0 <= d. Slab K lies over
+    Seat j is at chainage (j + 1/2) d and enters at s = l + r; the rear seat has -r < s_0 <= d - r. Slab K lies over
     K p < x < (K + 1) p.
 
     Args:
@@ -22,13 +22,14 @@ def window_clock(slab: Slab, X: Reals, V: Reals, V_rate: Reals) -> Reals:
         X: Chainage of the window's rear end [m], shape (steps,).
         V: Speed [m/s].
         V_rate: Its rate [m/s^2].
+        reach: How far outside the window a seat's middle may stand, r [m].
 
     Returns:
         Rows for the kernels, see ``layout``, shape (steps, N_CLOCK).
     """
     d, p = slab.fastening_pitch, slab.pitch
     clock = np.zeros((len(X), at.N_CLOCK))
-    first = np.maximum(np.floor(X / d - 0.5).astype(np.int64) + 1, 0)
+    first = np.maximum(np.floor((X - reach) / d - 0.5).astype(np.int64) + 1, 0)
     clock[:, at.POSITION], clock[:, at.SPEED], clock[:, at.SPEED_RATE] = X, V, V_rate
     clock[:, at.FIRST_SEAT] = first
     clock[:, at.FIRST_SEAT_S] = (first + 0.5) * d - X

@@ -119,12 +119,20 @@ def _limits(axes: NDArray[np.object_], train: Train) -> None:
     limit_line(axes[0], mean, "static load", left=True)
     limit_line(axes[0], lowest, f"GB/T 5599, unloading {gb5599.unloading_limit(speed):g} (means over 2 m)")
     axle = float(static.sum())
+    vehicle_class = train.scenario.parts.vehicles[0].vehicle_class
+    axle_limits = {
+        "EN 14363": en14363.axle_force_limit(axle, vehicle_class),
+        "GB/T 5599": gb5599.axle_force_limit(axle, vehicle_class),
+    }
+    same = gb5599.DERAILMENT_LIMITS.get(vehicle_class) == en14363.QUOTIENT_LIMIT
+    quotient = "EN 14363, GB/T 5599" if same else "EN 14363"
     for sign in (1.0, -1.0):
         below = sign > 0.0
-        limit_line(axes[2], sign * en14363.axle_force_limit(axle), "EN 14363", below=below)
-        limit_line(axes[2], sign * gb5599.axle_force_limit(axle), "GB/T 5599", below=not below)
-        limit_line(axes[3], sign * en14363.QUOTIENT_LIMIT, "EN 14363, GB/T 5599", below=below)
-    widest = 1.25 * gb5599.axle_force_limit(axle)
+        for name, limit in axle_limits.items():
+            if limit is not None:
+                limit_line(axes[2], sign * limit, name, below=below == (name == "EN 14363"))
+        limit_line(axes[3], sign * en14363.QUOTIENT_LIMIT, quotient, below=below)
+    widest = 1.25 * max((limit for limit in axle_limits.values() if limit is not None), default=0.0)
     low, high = axes[2].get_ylim()
     axes[2].set_ylim(min(low, -widest), max(high, widest))  # room for the labels
 

@@ -19,6 +19,7 @@ from tiengine.indices.p2_resonance import p2_of
 from tiengine.indices.train_record import SLICE, AbsentError, Samples, Train
 from tiengine.parameters.arrays import Reals
 from tiengine.scenario.contact_settings import contact_settings
+from tiengine.vehicle.running_gear import cars, running_gears
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,14 +101,12 @@ def passing_frequencies(train: Train) -> dict[str, tuple[float, float]]:
         train: The train; its scenario gives all spacings and speeds.
     """
     scenario, parts = train.scenario, train.scenario.parts
-    axles = parts.vehicles[0].axle_positions
-    half = (len(axles) + 1) // 2
+    axles, gears = parts.vehicles[0].axle_positions, running_gears(parts.vehicles[0])
     distances = {"seats": parts.slab.fastening_pitch, "slabs": parts.slab.pitch}
-    if len(axles) > 2:
+    if len(axles) > 1:
         distances["wheelsets"] = float(axles[0] - axles[1])
-        distances["bogies"] = float(axles[:half].mean() - axles[half:].mean())
-    elif len(axles) == 2:
-        distances["wheelsets"] = float(axles[0] - axles[1])
+    if 1 < len(gears) < len(axles):
+        distances["bogies"] = gears[0].centre - gears[1].centre
     if len(parts.vehicles) > 1:
         distances["vehicles"] = float(parts.centres[0] - parts.centres[1])
     first, last = scenario.rear + scenario.centre_in_window, scenario.train.distance
@@ -140,10 +139,10 @@ def _accelerations(axes: Axes, train: Train, segment: float) -> None:
         return
     frequency, densities = welch(bodies, bodies.after(train.scenario.output.run_in), segment)
     S = densities["acceleration"]
-    car, frames, wheelsets = _bodies(train, list(bodies.group["body"].asstr()[:]))
+    car_rows, frames, wheelsets = _bodies(train, list(bodies.group["body"].asstr()[:]))
     looks = {
-        "car, vertical": (Look(BLUE, "-"), car, Z),
-        "car, lateral": (Look(ORANGE, "--"), car, Y),
+        "car, vertical": (Look(BLUE, "-"), car_rows, Z),
+        "car, lateral": (Look(ORANGE, "--"), car_rows, Y),
         "bogie frames, vertical": (Look(GREEN, "-."), frames, Z),
         "wheelsets, vertical": (Look(BLACK, ":"), wheelsets, Z),
     }
@@ -153,15 +152,15 @@ def _accelerations(axes: Axes, train: Train, segment: float) -> None:
 
 
 def _bodies(train: Train, names: Sequence[str]) -> tuple[list[int], list[int], list[int]]:
-    """Rows of the leading vehicle's car, frames and wheelsets among the recorded bodies."""
+    """Rows of the leading vehicle's cars, other suspended bodies and wheelsets among the recorded bodies."""
     vehicles = train.scenario.parts.vehicles
     prefix = "v1 " if len(vehicles) > 1 else ""
-    suspended = [body for body in vehicles[0].body if not body.wheelset]
-    car = max(suspended, key=lambda body: body.mass, default=None)
+    suspended = [body.name for body in vehicles[0].body if not body.wheelset]
+    car_names = [car.body.name for car in cars(vehicles[0])]
     axles = len(vehicles[0].axle_positions)
     wanted = (
-        [f"{prefix}{car.name}"] if car else [],
-        [f"{prefix}{body.name}" for body in suspended if body is not car],
+        [f"{prefix}{name}" for name in car_names],
+        [f"{prefix}{name}" for name in suspended if name not in car_names],
         [f"wheelset {i + 1}" for i in range(axles)],
     )
     return tuple([names.index(name) for name in group if name in names] for group in wanted)  # type: ignore[return-value]

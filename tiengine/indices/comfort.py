@@ -4,6 +4,8 @@ EN 12299, mean comfort, from the 95th percentiles of the weighted rms over block
 
     N_MV = 6 sqrt(a_x^2 + a_y^2 + a_z^2)
 
+Only passengers' vehicles have a mean comfort; freight wagons have neither index.
+
 ISO 2631-1, from the weighted rms over the whole run, Wd for y, Wk for z: a_v = sqrt(a_y^2 + a_z^2).
 
 The model has no longitudinal vibration: a_x = 0. Neither standard sets a limit; both define classes.
@@ -17,7 +19,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tiengine.indices.filters import block_rms, weighted
-from tiengine.indices.index import Index, worst
+from tiengine.indices.index import Index, worst_of
 from tiengine.indices.ride import FloorPoint, Ride
 from tiengine.parameters.arrays import Reals
 
@@ -47,17 +49,25 @@ def total_rms(y: Reals, z: Reals) -> float:
 
 
 def en12299_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
-    """Yield the mean comfort at the worst floor point."""
-    yield worst(_mean_comfort_at(ride, vehicle, point) for point in ride.floor(vehicle))
+    """Yield the mean comfort at the worst floor point; nothing for locomotives and freight wagons."""
+    if ride.vehicle_classes[vehicle] in ("coach", None):
+        yield from worst_of(_mean_comfort_at(ride, vehicle, point) for point in _floor(ride, vehicle))
 
 
 def iso2631_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
-    """Yield the weighted rms at the worst floor point."""
-    yield worst(_rms_at(ride, vehicle, point) for point in ride.floor(vehicle))
+    """Yield the weighted rms at the worst floor point; nothing for freight wagons."""
+    if ride.vehicle_classes[vehicle] != "freight":
+        yield from worst_of(_rms_at(ride, vehicle, point) for point in _floor(ride, vehicle))
+
+
+def _floor(ride: Ride, vehicle: int) -> list[FloorPoint]:
+    """Floor points whose acceleration is known in both directions."""
+    return [point for point in ride.floor(vehicle) if len(point.acceleration) == 2]
 
 
 def _mean_comfort_at(ride: Ride, vehicle: int, point: FloorPoint) -> Index:
-    y, z = (block_rms(series, ride.body_interval, BLOCK) for series in _weighted(ride, point, "Wb"))
+    times = ride.acceleration_times
+    y, z = (block_rms(series, times.interval, BLOCK) for series in _weighted(ride, point, "Wb"))
     value = mean_comfort(y, z) if len(y) else None
     return Index(
         standard=EN,
@@ -74,6 +84,7 @@ def _mean_comfort_at(ride: Ride, vehicle: int, point: FloorPoint) -> Index:
 
 
 def _rms_at(ride: Ride, vehicle: int, point: FloorPoint) -> Index:
+    duration = ride.acceleration_times.duration()
     value = total_rms(*_weighted(ride, point, "Wk"))
     return Index(
         standard=ISO,
@@ -84,15 +95,14 @@ def _rms_at(ride: Ride, vehicle: int, point: FloorPoint) -> Index:
         unit="m/s^2",
         limit=None,
         clause="6.1, 6.5; classes of annex C",
-        shortfall=""
-        if ride.duration >= ISO_DURATION
-        else f"{ride.duration:.3g} s, {ISO_DURATION:g} s at least for 1 Hz",
+        shortfall="" if duration >= ISO_DURATION else f"{duration:.3g} s, {ISO_DURATION:g} s at least for 1 Hz",
         note=ISO_CLASSES[bisect_left(ISO_BOUNDS, value)],
     )
 
 
 def _weighted(ride: Ride, point: FloorPoint, vertical: str) -> tuple[Reals, Reals]:
     """Weighted lateral and vertical acceleration after the run-in [m/s^2], shape (n,) each."""
-    y = weighted(point.lateral, ride.body_interval, "Wd")
-    z = weighted(point.vertical, ride.body_interval, vertical)
-    return ride.after_run_in(y), ride.after_run_in(z)
+    times = ride.acceleration_times
+    y = weighted(point.acceleration["lateral"], times.interval, "Wd")
+    z = weighted(point.acceleration["vertical"], times.interval, vertical)
+    return y[times.used()], z[times.used()]

@@ -7,6 +7,9 @@ series is the greater in magnitude of its percentiles 0.15 and 99.85, for Q the 
 A zone has sections of 250 m, above 220 km/h of 500 m, at least 25 of them and 10 km in total. Then the estimated
 maximum is mean + k standard deviation of the sections' values, k = 3.0 for running safety and 2.2 otherwise: an
 assessment. Over a shorter distance the percentiles are taken over the whole run: an index.
+
+Limits of Y/Q and Q hold for all vehicles, others only for the classes that :data:`AXLE_FACTORS` and
+:data:`ACCELERATION_LIMITS` list; a value without a limit for its class is given without one.
 """
 
 from __future__ import annotations
@@ -16,12 +19,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tiengine.indices.filters import band_pass, sliding_mean
-from tiengine.indices.index import Index, worst
-from tiengine.indices.ride import Ride
+from tiengine.indices.filters import band_pass, band_pass_settling, sliding_mean
+from tiengine.indices.index import Index, no_limit, worst, worst_of
+from tiengine.indices.ride import Direction, FloorPoint, Ride
 from tiengine.parameters.arrays import Reals
+from tiengine.vehicle.connector import VehicleClass
 
 __all__ = [
+    "ACCELERATION_LIMITS",
+    "BAND",
     "QUOTIENT_LIMIT",
     "axle_force_limit",
     "body_indices",
@@ -34,7 +40,10 @@ __all__ = [
 STANDARD = "EN 14363:2016"
 SAFETY, OTHER = 3.0, 2.2  # k for running safety; for track loading and ride characteristics
 QUOTIENT_LIMIT = 0.8
-ACCELERATION_LIMIT = 2.5  # m/s^2
+AXLE_FACTORS: dict[VehicleClass | None, float] = {"coach": 1.0, "locomotive": 1.0, "freight": 0.85}
+"""Factor k1 of the limit of the sum of Y by class."""
+ACCELERATION_LIMITS: dict[VehicleClass | None, float] = {"coach": 2.5}
+"""Limit of floor accelerations by class [m/s^2]."""
 BAND = (0.4, 10.0)  # Hz
 FAST = 220.0 / 3.6  # m/s, above which sections are longer
 SECTIONS, ZONE = 25, 10e3  # least number of sections, least length of a zone [m]
@@ -96,13 +105,15 @@ def wheel_force_limit(static: float, speed: float) -> float:
     return min(90.0 + static, Q_CAPS[bisect_left(Q_SPEEDS, 3.6 * speed - 1e-6)])
 
 
-def axle_force_limit(static: float) -> float:
-    """Return the limit of the sum of Y of a wheelset [kN], with k1 = 1: all vehicles but freight wagons.
+def axle_force_limit(static: float, vehicle_class: VehicleClass | None) -> float | None:
+    """Return the limit of the sum of Y of a wheelset [kN], k1 (10 + static/3); None for a class without one.
 
     Args:
         static: Static load of the wheelset, both wheels [kN].
+        vehicle_class: Class of the vehicle; None if it is not stated.
     """
-    return 10.0 + static / 3.0
+    factor = AXLE_FACTORS.get(vehicle_class)
+    return None if factor is None else factor * (10.0 + static / 3.0)
 
 
 def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
@@ -115,14 +126,14 @@ def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
 
 
 def _wheelset_indices(ride: Ride, vehicle: int, wheelset: int) -> Iterator[Index]:
-    forces = ride.forces(wheelset)
-    speed, reason = ride.speed, shortfall(ride.distance, ride.speed)
+    forces, speed, vehicle_class = ride.forces(wheelset), ride.speed, ride.vehicle_classes[vehicle]
+    reason = _shortfall(ride, forces.position)
 
-    def index(name: str, place: str, value: float, unit: str, limit: float, clause: str) -> Index:
+    def index(name: str, place: str, value: float, unit: str, limit: float | None, clause: str) -> Index:
         place = f"wheelset {wheelset + 1}{place}"
         return Index(
             standard=STANDARD, name=name, vehicle=vehicle + 1, place=place, value=value, unit=unit, limit=limit,
-            clause=clause, shortfall=reason,
+            clause=clause, shortfall=reason, note=no_limit(vehicle_class) if limit is None else "",
         )  # fmt: skip
 
     for i, side in enumerate((" left", " right")):
@@ -132,34 +143,47 @@ def _wheelset_indices(ride: Ride, vehicle: int, wheelset: int) -> Iterator[Index
         limit = wheel_force_limit(1e-3 * forces.static[i], speed)
         yield index("wheel force Q", side, value, "kN", limit, "7.5.3 track loading")
     value = 1e-3 * extreme(*sliding_mean(forces.position, forces.Y.sum(axis=1)), speed, SAFETY)
-    limit = axle_force_limit(1e-3 * float(forces.static.sum()))
-    yield index("sum of Y, 2 m mean", "", value, "kN", limit, "7.5.2 running safety")
+    axle_limit = axle_force_limit(1e-3 * float(forces.static.sum()), vehicle_class)
+    yield index("sum of Y, 2 m mean", "", value, "kN", axle_limit, "7.5.2 running safety")
 
 
 def body_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
-    """Yield lateral and vertical acceleration at the worst floor point over a bogie."""
-    long_enough = ride.duration * BAND[0] >= 1.0
-    for direction in ("lateral", "vertical"):
-        found = []
-        for point in ride.floor(vehicle):
-            if not point.over_bogie:
-                continue
-            value = None
-            if long_enough:
-                series = band_pass(getattr(point, direction), ride.body_interval, *BAND)
-                value = extreme(ride.body_position, ride.after_run_in(series), ride.speed, OTHER)
-            found.append(
-                Index(
-                    standard=STANDARD,
-                    name=f"{direction} acceleration",
-                    vehicle=vehicle + 1,
-                    place=point.name,
-                    value=value,
-                    unit="m/s^2",
-                    limit=ACCELERATION_LIMIT,
-                    clause="7.5.4 ride characteristics",
-                    shortfall=shortfall(ride.distance, ride.speed),
-                    note="" if long_enough else "run shorter than a period of 0.4 Hz, 2.5 s",
-                )
-            )
-        yield worst(found)
+    """Yield lateral and vertical acceleration at the worst floor point over a running gear."""
+    points = [point for point in ride.floor(vehicle) if point.over_bogie]
+    directions: tuple[Direction, ...] = ("lateral", "vertical")
+    for direction in directions:
+        yield from worst_of(
+            _acceleration_at(ride, vehicle, point, direction) for point in points if direction in point.acceleration
+        )
+
+
+def _acceleration_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Direction) -> Index:
+    times, vehicle_class = ride.acceleration_times, ride.vehicle_classes[vehicle]
+    limit = ACCELERATION_LIMITS.get(vehicle_class)
+    settling = band_pass_settling(*BAND)
+    position = times.position[times.used(settling)]
+    value, note = (
+        None,
+        f"run shorter than a period of 0.4 Hz, 2.5 s, and {2.0 * settling:g} s of settling of the filter",
+    )
+    if times.duration(settling) * BAND[0] >= 1.0:
+        series = band_pass(point.acceleration[direction], times.interval, *BAND)[times.used(settling)]
+        value, note = extreme(position, series, ride.speed, OTHER), no_limit(vehicle_class) if limit is None else ""
+    return Index(
+        standard=STANDARD,
+        name=f"{direction} acceleration",
+        vehicle=vehicle + 1,
+        place=point.name,
+        value=value,
+        unit="m/s^2",
+        limit=limit,
+        clause="7.5.4 ride characteristics",
+        shortfall=_shortfall(ride, position),
+        note=note,
+    )
+
+
+def _shortfall(ride: Ride, position: Reals) -> str:
+    """Shortfall of the run, or of the chainages that the settling of filters leaves of it [m], shape (n,)."""
+    used = float(position[-1] - position[0]) if len(position) else 0.0
+    return shortfall(ride.distance, ride.speed) or shortfall(used, ride.speed)

@@ -1,7 +1,10 @@
 """Filters of the standards for sampled series, and means over distance.
 
 Low and band pass: a Butterworth filter applied forward and backward, hence without delay; four poles in total, 24 dB
-per octave, -3 dB at the cut-off.
+per octave, -3 dB at the cut-off. Near an end such a filter needs samples that were not recorded. The series is
+continued there, and the samples within :func:`low_pass_settling` or :func:`band_pass_settling` of an end are not to
+be used: the others differ from those of a longer record by less than 1 % for a sine, and by 2 % of the standard
+deviation for noise.
 
 Frequency weightings of human vibration: the standards give H(s), s = 2 pi i f,
 
@@ -9,9 +12,9 @@ Frequency weightings of human vibration: the standards give H(s), s = 2 pi i f,
       * (1 + s/w3) / (1 + s/(Q2 w4) + (s/w4)^2)                                   acceleration to velocity, f3 and f4
       * K (1 + s/(Q3 w5) + (s/w5)^2) / (1 + s/(Q4 w6) + (s/w6)^2)                 upward step, f5 and f6 (Wb, Wk)
 
-A series is weighted by H itself in the frequency domain, with zeros appended until the response has decayed. For
-comparison, the bilinear transform of Wk sampled at 1 kHz is 0.6 % low at 40 Hz and 3.4 % at 80 Hz; at 250 Hz 9 and
-60 %.
+A series is weighted by H itself in the frequency domain, with its continuation before it and zeros after it until the
+response has decayed; H is causal, so that the end of the series has no effect. For comparison, the bilinear transform
+of Wk sampled at 1 kHz is 0.6 % low at 40 Hz and 3.4 % at 80 Hz; at 250 Hz 9 and 60 %.
 """
 
 from __future__ import annotations
@@ -23,9 +26,20 @@ from numpy.typing import NDArray
 from scipy import fft, signal
 from scipy.integrate import cumulative_trapezoid
 
+from tiengine.indices.continuation import continued
 from tiengine.parameters.arrays import Reals
 
-__all__ = ["WEIGHTINGS", "Weighting", "band_pass", "block_rms", "low_pass", "sliding_mean", "weighted"]
+__all__ = [
+    "WEIGHTINGS",
+    "Weighting",
+    "band_pass",
+    "band_pass_settling",
+    "block_rms",
+    "low_pass",
+    "low_pass_settling",
+    "sliding_mean",
+    "weighted",
+]
 
 _TWO_PASSES = (np.sqrt(2.0) - 1.0) ** 0.25  # two passes of 1/(1 + r^4) are 1/sqrt(2) at this r
 _DECAY = 10.0  # s after which the response of the band limit at 0.4 Hz is below 2e-8
@@ -96,9 +110,11 @@ def weighted(series: Reals, interval: float, name: str) -> Reals:
     Returns:
         The weighted series, shape (n,).
     """
-    size = fft.next_fast_len(len(series) + round(_DECAY / interval), real=True)
+    longer, before = continued(series, interval, _DECAY)
+    longer[before + len(series) :] = 0.0
+    size = fft.next_fast_len(len(longer), real=True)
     H = WEIGHTINGS[name].response(fft.rfftfreq(size, interval))
-    return np.asarray(fft.irfft(H * fft.rfft(series, size), size)[: len(series)])
+    return np.asarray(fft.irfft(H * fft.rfft(longer, size), size)[before : before + len(series)])
 
 
 def low_pass(series: Reals, interval: float, cut_off: float) -> Reals:
@@ -115,30 +131,40 @@ def low_pass(series: Reals, interval: float, cut_off: float) -> Reals:
     return _two_passes(series, interval, cut_off, "low")
 
 
+def low_pass_settling(cut_off: float) -> float:
+    """Return the time [s] at either end within which a low pass is not used: a period of the cut-off [Hz]."""
+    return 1.0 / cut_off
+
+
 def band_pass(series: Reals, interval: float, low: float, high: float) -> Reals:
     """Apply a band pass without delay, -3 dB at both ends, 24 dB per octave.
 
     Args:
-        series: Samples, shape (n, ...).
+        series: Samples, shape (n,).
         interval: Time between samples [s].
         low: Lower end [Hz].
         high: Upper end [Hz].
 
     Returns:
-        The filtered series, shape (n, ...).
+        The filtered series, shape (n,).
     """
-    below = low_pass(series, interval, high)
-    return _two_passes(below, interval, low, "high")
+    longer, before = continued(series, interval, 2.5 / low)
+    below = low_pass(longer, interval, high)
+    return _two_passes(below, interval, low, "high")[before : before + len(series)]
+
+
+def band_pass_settling(low: float, high: float) -> float:
+    """Return the time [s] at either end within which a band pass between two frequencies [Hz] is not used."""
+    return max(0.5 / low, 1.0 / high)
 
 
 def _two_passes(series: Reals, interval: float, cut_off: float, kind: str) -> Reals:
     ratio = 1.0 / _TWO_PASSES if kind == "low" else _TWO_PASSES
     corner = np.arctan(ratio * np.tan(np.pi * cut_off * interval)) / (np.pi * interval)  # exact for the sampled filter
     sections = signal.butter(2, corner, kind, fs=1.0 / interval, output="sos")
-    extension = min(
-        len(series) - 1, round(2.0 / cut_off / interval)
-    )  # odd extension by two periods against end effects
-    return np.asarray(signal.sosfiltfilt(sections, series, axis=0, padlen=extension), np.float64)
+    extension = min(len(series) - 1, round(2.0 / cut_off / interval))  # two periods
+    filtered = signal.sosfiltfilt(sections, series, axis=0, padtype="even", padlen=extension)
+    return np.asarray(filtered, np.float64)
 
 
 def sliding_mean(position: Reals, series: Reals, length: float = 2.0, step: float = 0.5) -> tuple[Reals, Reals]:

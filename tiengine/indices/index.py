@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-__all__ = ["Index", "Verdict", "worst"]
+__all__ = ["Index", "Verdict", "no_limit", "worst", "worst_of"]
 
 Verdict = Literal["within", "over", "none"]
 
@@ -64,6 +64,24 @@ class Index:
         return {**asdict(self), "kind": self.kind, "verdict": self.verdict}
 
 
+def no_limit(vehicle_class: str | None) -> str:
+    """Say why a value has no limit.
+
+    Args:
+        vehicle_class: Class of the vehicle; None if it is not stated.
+    """
+    if vehicle_class is None:
+        return "no limit, since the class of the vehicle is not stated: set its vehicle_class, or use --class"
+    return f"no limit known for vehicles of class {vehicle_class}"
+
+
 def worst(indices: Iterable[Index]) -> Index:
     """Return the worst of the values of one index at several places."""
     return max(indices, key=lambda index: index.severity)
+
+
+def worst_of(indices: Iterable[Index]) -> Iterator[Index]:
+    """Yield the worst of the values of one index at several places, or nothing if there are none."""
+    found = list(indices)
+    if found:
+        yield worst(found)

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from tiengine.indices import comfort, en14363, gb5599
 from tiengine.indices.index import Index
+from tiengine.indices.recorded_ride import RecordedRide
 from tiengine.indices.ride import Ride
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.recorded import recorded_scenario
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Reader
-    from tiengine.scenario.scenario import Scenario
+    from tiengine.vehicle.connector import VehicleClass
 
-__all__ = ["Metrics", "Spread", "TrainMetrics", "evaluate"]
+__all__ = ["Metrics", "Spread", "TrainMetrics", "evaluate", "train_metrics"]
 
 FORMAT, FORMAT_VERSION = "tiengine-metrics", 1
 METHODS = (
@@ -102,12 +103,13 @@ class Metrics:
         return json.dumps(tables, indent=2)
 
 
-def evaluate(result: Reader, train: int | None = None) -> Metrics:
+def evaluate(result: Reader, train: int | None = None, vehicle_class: VehicleClass | None = None) -> Metrics:
     """Compute the indices of a result.
 
     Args:
         result: An open file.
         train: Number of one train; all if None.
+        vehicle_class: Class of all vehicles, instead of what their data state.
 
     Raises:
         InputError: There is no such train, no train completed its run, channels are missing, the sampling is too coarse
@@ -121,12 +123,18 @@ def evaluate(result: Reader, train: int | None = None) -> Metrics:
     if not complete:
         raise InputError(f"{result.name}: no train completed its run: {next(iter(failed.values()), 'there is none')}")
     members = recorded_scenario(result).members
-    return Metrics(result.name, tuple(_train(result, i, members[i]) for i in complete), failed)
+    rides = ((i, RecordedRide(result, i, members[i], vehicle_class)) for i in complete)
+    return Metrics(result.name, tuple(train_metrics(ride, i) for i, ride in rides), failed)
 
 
-def _train(result: Reader, train: int, scenario: Scenario) -> TrainMetrics:
-    ride = Ride(result, train, scenario)
-    vehicles = range(len(ride.vehicles))
+def train_metrics(ride: Ride, train: int = 0) -> TrainMetrics:
+    """Compute the indices of one ride.
+
+    Args:
+        ride: Signals of the train.
+        train: Number of the train.
+    """
+    vehicles = range(len(ride.vehicle_classes))
     return TrainMetrics(train, ride.distance, tuple(x for v in vehicles for method in METHODS for x in method(ride, v)))
 
 

@@ -7,13 +7,13 @@ z = z_v + sigma b_i theta and y = y_a + sigma g/2, b_i = 0.75 m.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from pathlib import Path
 from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
-from tiengine.irregularity.measured_files import band_passed, read_series
+from tiengine.irregularity.measured_files import MeasuredSeries, read_series
 from tiengine.irregularity.measured_track import MeasuredTrack, smooth_step
 from tiengine.irregularity.random_track import BlockSpline, noise_spline
 from tiengine.irregularity.spectrum import (
@@ -24,7 +24,10 @@ from tiengine.irregularity.spectrum import (
     load_spectrum,
     spectrum_names,
 )
+from tiengine.irregularity.track_columns import FileColumns
 from tiengine.irregularity.track_function import TrackFunction
+from tiengine.irregularity.track_text import Encoding
+from tiengine.irregularity.wave_content import band_passed, shortest_content
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError, nearest
 from tiengine.parameters.quantity import Params, Q
@@ -32,14 +35,10 @@ from tiengine.parameters.quantity import Params, Q
 __all__ = [
     "HALF_BASE",
     "PATCH_HALF_LENGTH",
-    "STEPS_PER_WAVE",
     "Irregularity",
     "IrregularityParams",
     "at_wheels",
-    "check_reach",
-    "check_step",
     "make_irregularity",
-    "shortest_wavelength",
 ]
 
 HALF_BASE = 0.75
@@ -48,10 +47,8 @@ HALF_BASE = 0.75
 PATCH_HALF_LENGTH = 6e-3
 """Half length of the contact patch along the rail [m] in the filter of short waves (6 to 7 mm at 70 kN)."""
 
-STEPS_PER_WAVE = 8.0
-"""Fewest time steps in which a wheel may pass the shortest wavelength (MODEL §6)."""
-
 _ROUGHNESS_BLOCK = 64.0  # m, half a block at least: a train then lies in a few blocks, not hundreds
+_RAIL_SCALES = np.array([1.0, 1.0, HALF_BASE, 0.5])  # of z_v, y_a, theta, gauge to the displacement of a rail
 _MOST_BANDWIDTH = 1e4  # longest over shortest wave; a block then takes 40 MB
 
 
@@ -92,6 +89,9 @@ class IrregularityParams(Params):
     function: Annotated[
         str | None, Field(description="name of the Python function that gives the track; set by `tiengine.run`")
     ] = None
+    file_columns: FileColumns = FileColumns()
+    file_encoding: Annotated[Encoding, Field(description='"auto" detects UTF-8, UTF-16, GBK and Latin-1')] = "auto"
+    file_bridge: Annotated[float, Q("m", "longest gap of the file that is filled", ge=0, le=100)] = 0.0
     file_unit: Annotated[Literal["m", "mm"], Field(description="unit of columns that state none")] = "m"
     file_start: Annotated[float | None, Q("m", "mileage of the file at chainage zero")] = None
     file_reverse: Annotated[bool, Field(description="the train passes the rows from last to first")] = False
@@ -210,6 +210,7 @@ class Irregularity:
         taper: float,
         shortest: float,
         reach: tuple[float, float] = (-np.inf, np.inf),
+        description: str = "",
     ) -> None:
         """Sum contributions.
 
@@ -219,7 +220,9 @@ class Irregularity:
             taper: Length over which the irregularity begins [m].
             shortest: Shortest wavelength of the contributions [m]; infinite where unknown.
             reach: Chainages where a measured track begins and ends [m].
+            description: How a measured track was read, in words.
         """
+        self.description = description
         self.start, self.end = reach
         self._parts = parts
         self.taper_start, self.taper, self.shortest_wavelength = taper_start, taper, shortest
@@ -255,26 +258,6 @@ class Irregularity:
         return out.reshape(*chainage.shape, -1)
 
 
-def check_step(shortest: float, speed: float, dt: float, name: str = "irregularity: shortest wavelength") -> None:
-    """Refuse wavelengths that the time step cannot resolve.
-
-    Args:
-        shortest: Shortest wavelength [m].
-        speed: Highest speed V [m/s].
-        dt: Time step [s].
-        name: Name of the wavelength in the message.
-
-    Raises:
-        InputError: The wavelength is below 8 V dt (MODEL §6).
-    """
-    least = STEPS_PER_WAVE * speed * dt
-    if shortest < least:
-        raise InputError(
-            f"{name} = {shortest:g}: must be at least {STEPS_PER_WAVE:g} V dt = {least:.4g} m"
-            f" at a time step of {dt:g} s; choose a smaller step or a longer wave"
-        )
-
-
 def make_irregularity(
     params: IrregularityParams, taper_start: float, function: TrackFunction | None = None
 ) -> Irregularity:
@@ -289,9 +272,11 @@ def make_irregularity(
         InputError: The file breaks a rule, or the function is missing.
     """
     parts: list[_Track] = []
-    shortest, reach = params.shortest_wavelength, (-np.inf, np.inf)
+    shortest, reach, description = params.shortest_wavelength, (-np.inf, np.inf), ""
     if params.file is not None:
-        measured = MeasuredTrack(_measured_series(params, params.file), params.taper)
+        series = _measured_series(params, params.file)
+        measured = MeasuredTrack(series.values, params.taper)
+        description = f"{Path(params.file).name}: {series.description}"
         if measured.end <= taper_start:
             raise InputError(
                 f"irregularity.file = {params.file!r}: ends at chainage {measured.end:g} m, before the run"
@@ -299,7 +284,8 @@ def make_irregularity(
             )
         parts.append(measured)
         reach = (measured.start, measured.end)
-        shortest = min(shortest, max(measured.shortest, params.wavelength_min if params.file_band_pass else 0.0))
+        content = shortest_content(series.values, _RAIL_SCALES)
+        shortest = min(shortest, max(content, params.wavelength_min if params.file_band_pass else 0.0))
     elif params.function is not None:
         if function is None:
             raise InputError(
@@ -319,51 +305,25 @@ def make_irregularity(
         band = (params.short_wave_min, params.short_wave_max)
         rails = noise_spline(params.seed, (4, 5), (filtered, filtered), band, shortest_block=_ROUGHNESS_BLOCK)
         parts.append(_Roughness(rails))
-    return Irregularity(parts, taper_start, params.taper, shortest, reach)
+    return Irregularity(parts, taper_start, params.taper, shortest, reach, description)
 
 
-def shortest_wavelength(params: IrregularityParams) -> float:
-    """Shortest wavelength that the time step must resolve [m]; infinite where unknown, as for a function.
-
-    Args:
-        params: Parameters; a file is read.
-
-    Raises:
-        InputError: The file breaks a rule.
-    """
-    return params.shortest_wavelength if params.file is None else make_irregularity(params, -np.inf).shortest_wavelength
-
-
-def check_reach(tracks: Iterable[Irregularity], end: float) -> None:
-    """Refuse a measured track that the train never reaches.
-
-    Args:
-        tracks: Irregularity of each train.
-        end: Chainage of the leading wheel at the end of the run [m].
-
-    Raises:
-        InputError: A track begins beyond it.
-    """
-    for track in tracks:
-        if track.start >= end:
-            raise InputError(
-                f"irregularity.file: begins at chainage {track.start:g} m: must be before the end of the run, {end:g}"
-                " m; set file_start to the mileage of chainage zero"
-            )
-
-
-def _measured_series(params: IrregularityParams, file: str) -> Reals:
-    """Read chainage and channels of a file in the direction of travel, shape (n, 5)."""
+def _measured_series(params: IrregularityParams, file: str) -> MeasuredSeries:
+    """Read, filter and scale a file."""
     series = read_series(
         file,
         unit=params.file_unit,
         start=params.file_start,
         reverse=params.file_reverse,
         vertical_up=params.file_vertical_up,
+        columns=params.file_columns,
+        encoding=params.file_encoding,
+        bridge=params.file_bridge,
     )
+    values = series.values
     if params.file_band_pass:
-        series = band_passed(series, params.wavelength_min, params.wavelength_max)
-    return np.column_stack([series[:, 0], params.scale * series[:, 1:]])
+        values = band_passed(values, params.wavelength_min, params.wavelength_max)
+    return MeasuredSeries(np.column_stack([values[:, 0], params.scale * values[:, 1:]]), series.description)
 
 
 def _track_densities(params: IrregularityParams) -> list[Density]:

@@ -23,7 +23,6 @@ class MeasuredTrack:
         x = series[:, 0]
         self.start, self.end = float(x[0]), float(x[-1])
         self.taper = min(taper, 0.5 * (self.end - self.start))
-        self.shortest = 2.0 * float(np.diff(x).min())
         self._value = CubicSpline(x, series[:, 1:], bc_type="natural")
         self._slope = self._value.derivative()
 

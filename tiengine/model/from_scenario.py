@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table_cache import contact_table
-from tiengine.model.model import Ingredients, SlabDesigns
+from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.model.newmark import Newmark
 from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import Scenario
@@ -30,7 +30,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         InputError: Parts that do not fit together.
     """
     parts, numerics = scenario.parts, scenario.numerics
-    train = assemble(parts.vehicles, parts.centres, series_springs=scenario.train.series_springs or None)
+    asked = scenario.train
+    train = assemble(parts.vehicles, parts.centres, series_springs=asked.series_springs or None, effort=asked.effort)
     return Ingredients(
         rail=parts.rail,
         fastening=parts.fastening,
@@ -43,7 +44,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         friction=scenario.track.friction,
         cross_level_rolls=scenario.contact.cross_level_rolls_rails,
         length=scenario.window_length,
-        modes=scenario.modes,
+        modes=numerics.modes(scenario.window_length),
+        grading=numerics.knots if numerics.trial_functions == "splines" else None,
         newmark=Newmark(dt),
         passes=numerics.passes,
         cover=numerics.slab_count == "cover",

@@ -38,6 +38,10 @@ def nearest(name: str, known: list[str] | tuple[str, ...]) -> str:
     return f"; known: {', '.join(known)}" if known else ""
 
 
+class InputNote(UserWarning):
+    """A remark on input that was accepted; the message is one line that names object, value and interpretation."""
+
+
 class RunFailedError(RuntimeError):
     """A run that failed; the message says where, when and why."""
 

@@ -7,6 +7,7 @@ never end.
 
 from __future__ import annotations
 
+import codecs
 import math
 import os
 import re
@@ -107,7 +108,7 @@ def read_bytes(path: str | Path, where: str, largest: int) -> bytes:
 
 
 def read_text_file(path: str | Path, where: str, largest: int) -> str:
-    """Read a text file of bounded size; a text that is not UTF-8 is read as Latin-1.
+    """Read a text file of bounded size, UTF-8 or UTF-16 with a byte-order mark, else Latin-1.
 
     Args:
         path: The file.
@@ -118,6 +119,8 @@ def read_text_file(path: str | Path, where: str, largest: int) -> str:
         InputError: The file cannot be read, is too large, is no text, or has an overlong line.
     """
     data = read_bytes(path, where, largest)
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        data = data.decode("utf-16", errors="replace").encode()
     if b"\0" in data:
         raise InputError(f"{where}: line {data[: data.index(0)].count(10) + 1}: not a text file")
     try:

@@ -18,7 +18,8 @@ from taichi.lang import impl
 from threadpoolctl import threadpool_limits
 
 from tiengine.engine.sine_stepper import SineStepper
-from tiengine.engine.stepper import BETWEEN_STEPS
+from tiengine.engine.spline_stepper import SplineStepper
+from tiengine.engine.stepper import BETWEEN_STEPS, Stepper
 from tiengine.parameters.errors import InputError
 from tiengine.profiling.machine import import_seconds, this_machine, versions
 from tiengine.profiling.product_count import Work, count_products
@@ -41,7 +42,7 @@ HOME = {"suspension": "fastening kernel", "contact": "fastening kernel"}
 """Parts without a stage of their own, and the stage from whose time their estimate is subtracted."""
 
 ORDER = ("window and seats", "irregularity", "predictors and correctors", "linear forces", "motion at the seats",
-         "fastening kernel", "suspension", "contact", "mortar", "implicit solve", "recording", "envelopes",
+         "step", "fastening kernel", "suspension", "contact", "mortar", "implicit solve", "recording", "envelopes",
          "gauges", "deflection", "checks", "writing")  # fmt: skip
 """Rows of the table; other stages come after."""
 
@@ -117,11 +118,9 @@ def _profile(run: Run, writer: Writer, wall: Wall, steps: int) -> ProfileReport:
     measure(run, writer, warm_up)
     times = measure(run, writer, steps)
     stepper, ingredients = run.stepper, run.stepper.ingredients
-    assert isinstance(stepper, SineStepper)  # estimates and counts know its launches and products
-    memory = Memory(
-        peak_memory(), *(array_bytes(each) * 1e-6 for each in (stepper.model, stepper.state, stepper.chunk))
-    )
-    parts = _parts(stepper)
+    constant, state = _constant_data(stepper), dict(stepper.state.arrays())
+    memory = Memory(peak_memory(), *(array_bytes(each) * 1e-6 for each in (constant, state, stepper.chunk)))
+    parts = _parts(stepper) if isinstance(stepper, SineStepper) else {}
     work = count_products(stepper)
     machine = this_machine()
     roofs = measure_roofs(machine.l2_bytes, machine.l3_bytes)
@@ -157,6 +156,14 @@ def _profile(run: Run, writer: Writer, wall: Wall, steps: int) -> ProfileReport:
         roofs=roofs,
         rates=_rates(times, work, roofs),
     )
+
+
+def _constant_data(stepper: Stepper) -> object:
+    """Model of a stepper with its tables."""
+    if isinstance(stepper, SplineStepper):
+        return stepper.state.tables
+    assert isinstance(stepper, SineStepper)
+    return stepper.model
 
 
 def _parts(stepper: SineStepper) -> dict[str, tuple[float, float]]:

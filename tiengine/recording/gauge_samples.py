@@ -18,7 +18,7 @@ import numpy as np
 
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
 from tiengine.engine.stepper import Stepper
-from tiengine.model.model import Ingredients
+from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.conventions import SIDES
 from tiengine.recording.seat_envelopes import watched_seats

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tiengine.engine.stepper import Stepper
-from tiengine.model.model import Ingredients
+from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
 from tiengine.result_files.layout import Block
 
@@ -21,13 +21,15 @@ __all__ = ["SeatEnvelopes", "watched_seats"]
 
 
 def watched_seats(ingredients: Ingredients) -> tuple[int, int]:
-    """Places of the window (first, end) where the seats' forces are those of fastenings alone.
+    """Places of the window (first, end) where the seats' forces are those of whole fastenings alone.
 
-    Whatever the phase 0 < s_0 <= d of the seats, those in these places stand inside the window and outside its
-    absorbing zones, where springs to the ground add to the forces on the rail.
+    Whatever the phase -r < s_0 <= d - r of the seats, which reach r along the rail, those in these places stand with
+    their whole length inside the window and outside its absorbing zones, where springs to the ground add to the forces
+    on the rail.
     """
-    zone, length, spacing = ingredients.absorbing_zone, ingredients.length, ingredients.slab.fastening_pitch
-    return math.ceil(zone / spacing - 1e-9), math.floor((length - zone) / spacing + 1e-9)
+    reach, length, spacing = ingredients.seat_reach, ingredients.length, ingredients.slab.fastening_pitch
+    margin = max(ingredients.absorbing_zone, reach)
+    return math.ceil((margin + reach) / spacing - 1e-9), math.floor((length - margin + reach) / spacing + 1e-9)
 
 
 @dataclass(eq=False)
@@ -60,11 +62,12 @@ class SeatEnvelopes:
 
     def watch(self) -> None:
         """Take in the forces of a step."""
-        state, forces = self.stepper.state, self.stepper.state.seat_forces
+        if not self.stepper.seat_extremes_due:
+            return
+        state = self.stepper.state
         if state.first_seat != self.first_seat:
             self._move(state.first_seat)
-        np.maximum(self.largest, forces, out=self.largest)
-        np.minimum(self.smallest, forces, out=self.smallest)
+        state.widen(self.smallest, self.largest)
 
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
         """Seats that were left behind, train by train; neither times nor positions matter."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tiengine.engine.state import DISPLACEMENT
 from tiengine.engine.stepper import Stepper
 from tiengine.model.implicit_seats import seat_shapes
-from tiengine.model.model import Ingredients
+from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario

@@ -1,7 +1,7 @@
 """Contact geometry of a wheel on a rail, for ``tiengine contact``: rolling radii, conicity, contact points.
 
-The wheelset is shifted laterally on straight track and its roll follows (:mod:`tiengine.contact.conicity`). Conicity is
-that of harmonic linearisation; ``docs/files.md`` compares it with the integration of EN 15302.
+The wheelset is shifted laterally on straight track (:mod:`tiengine.contact.conicity`). Conicity is that of harmonic
+linearisation, with the wheelset's roll, or that of EN 15302, by integrating the motion without roll.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tiengine.contact.conicity import equivalent_conicity, wheelset_position
+from tiengine.contact.conicity import en15302_conicity, equivalent_conicity, unrolled_position, wheelset_position
 from tiengine.contact.profile import Profile
 from tiengine.contact.table import ContactSettings, WheelRailPair
 from tiengine.figures.palette import BLUE, GREEN, ORANGE, VERMILION
@@ -23,7 +23,14 @@ from tiengine.parameters.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ContactReport", "contact_report", "draw"]
+__all__ = ["METHODS", "ContactReport", "Method", "contact_report", "draw"]
+
+Method = Literal["harmonic", "en15302"]
+METHODS = {
+    "harmonic": (wheelset_position, equivalent_conicity, "harmonic linearisation, with roll"),
+    "en15302": (unrolled_position, en15302_conicity, "EN 15302, without roll"),
+}
+"""Position of the wheelset, equivalent conicity and description of each method."""
 
 REFERENCE_AMPLITUDE = 3e-3
 """Amplitude at which conicities are compared [m], EN 15302."""
@@ -45,6 +52,7 @@ class ContactReport:
         contact_angle: Inclination of the right contact, positive where the rail falls inward [rad], shape (n,).
         amplitude: Amplitudes A [m], shape (k,).
         conicity: Equivalent conicity at A, shape (k,).
+        method: How conicity is computed, a key of :data:`METHODS`.
     """
 
     pair: WheelRailPair
@@ -56,6 +64,7 @@ class ContactReport:
     contact_angle: Reals
     amplitude: Reals
     conicity: Reals
+    method: Method = "harmonic"
 
     @property
     def reference_conicity(self) -> float:
@@ -64,7 +73,7 @@ class ContactReport:
 
     def rows(self) -> list[tuple[str, str]]:
         """Return names and values of the table on screen."""
-        rows = [("equivalent conicity at 3 mm", f"{self.reference_conicity:.4f}")]
+        rows = [("equivalent conicity at 3 mm", f"{self.reference_conicity:.4f}"), ("method", METHODS[self.method][2])]
         for A, conicity in zip(self.amplitude[1::2], self.conicity[1::2], strict=False):
             difference = float(np.interp(A, self.shift, self.radius_difference))
             value = f"rolling-radius difference {difference * 1e3:.3f} mm, conicity {conicity:.4f}"
@@ -80,6 +89,7 @@ class ContactReport:
             "rail": self.pair.rail.name,
             "settings": settings,
             "units": {"length": "m", "angle": "rad", "conicity": "-"},
+            "method": self.method,
             "conicity_at_3mm": self.reference_conicity,
         }
         names = ("shift", "radius_difference", "roll", "wheel_station", "rail_station", "contact_angle")
@@ -87,7 +97,9 @@ class ContactReport:
         return json.dumps(content, indent=1)
 
 
-def contact_report(wheel: Profile, rail: Profile, settings: ContactSettings, largest: float = 8e-3) -> ContactReport:
+def contact_report(
+    wheel: Profile, rail: Profile, settings: ContactSettings, largest: float = 8e-3, method: Method = "harmonic"
+) -> ContactReport:
     """Compute the contact geometry.
 
     Args:
@@ -95,6 +107,7 @@ def contact_report(wheel: Profile, rail: Profile, settings: ContactSettings, lar
         rail: Rail profile.
         settings: Gauge, cant, spacing of the tape circles, wheel radius.
         largest: Largest shift and amplitude [m].
+        method: How conicity is computed, a key of :data:`METHODS`.
 
     Raises:
         InputError: ``largest`` is not between 3 and 20 mm, or a profile ends before the shift is reached.
@@ -104,7 +117,8 @@ def contact_report(wheel: Profile, rail: Profile, settings: ContactSettings, lar
     pair = WheelRailPair(wheel, rail, settings)
     half = round(largest / SHIFT_STEP)
     shift: Reals = SHIFT_STEP * np.arange(-half, half + 1, dtype=np.float64)
-    position = wheelset_position(pair, shift)
+    take_position, conicity, _ = METHODS[method]
+    position = take_position(pair, shift)
     amplitude: Reals = 0.5e-3 * np.arange(1, int(largest / 0.5e-3 + 1e-9) + 1, dtype=np.float64)
     return ContactReport(
         pair=pair,
@@ -115,7 +129,8 @@ def contact_report(wheel: Profile, rail: Profile, settings: ContactSettings, lar
         rail_station=position.right.s_r,
         contact_angle=np.arctan(position.right.tan_gamma),
         amplitude=amplitude,
-        conicity=equivalent_conicity(pair, amplitude),
+        conicity=conicity(pair, amplitude),
+        method=method,
     )
 
 
@@ -166,6 +181,7 @@ def _draw_conicity(axes: Axes, report: ContactReport) -> None:
     axes.plot(report.amplitude * 1e3, report.conicity, color=BLUE, marker="o", markersize=3)
     axes.plot(3.0, value, "s", color=VERMILION, label=f"{value:.4f} at 3 mm")
     axes.set(xlabel="amplitude [mm]", ylabel="equivalent conicity [-]", xlim=(0.0, None), ylim=(0.0, None))
+    axes.set_title(METHODS[report.method][2], fontsize="small")
     axes.grid(alpha=0.3)
     axes.legend()
 

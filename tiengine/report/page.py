@@ -186,12 +186,12 @@ def _facts(result: Result, train: int) -> Iterator[tuple[str, str]]:
     yield "file", result.name
     yield from summary(attributes)
     yield "status", result.status(train) if result.trains == 1 else f"{len(result.failures)} failures"
-    facts = result.facts(train)
-    if "window_length" in facts:
-        yield "window", f"{facts['window_length']:g} m"
-    for name in ("seed", "modes", "passes", "slabs", "seats_in_window", "trains_together"):
-        if name in facts:
-            yield name.replace("_", " "), str(facts[name])
+    own = result.facts(train)
+    if "window_length" in own:
+        yield "window", f"{own['window_length']:g} m"
+    for name in ("seed", "functions", "modes", "passes", "slabs", "seats_in_window", "trains_together"):
+        if name in own:
+            yield name.replace("_", " "), str(own[name])
     for name, value in attributes.items():
         if name.endswith("_version") or name == "platform":
             yield name.replace("_", " "), str(value)

@@ -112,8 +112,9 @@ def _numerics(scenario: Scenario) -> str:
     numerics = scenario.numerics
     step = "chosen by trial" if numerics.time_step == "auto" else f"{numerics.time_step:g} s"
     return (
-        f"window of {scenario.window_length:g} m with {scenario.modes} modes a field, time step {step},"
-        f" {numerics.passes} passes, modes left out: {numerics.truncation}, start: {numerics.start}"
+        f"window of {scenario.window_length:g} m with {scenario.trial_functions.count} {numerics.trial_functions} a"
+        f" field, time step {step}, {numerics.passes} passes, compliance that they lack: {numerics.truncation}, start:"
+        f" {numerics.start}"
     )
 
 

@@ -30,6 +30,11 @@ CSV_VALUES = 100_000  # values in memory at once: 13 MB as strings
 PARQUET_VALUES = 1_000_000  # values in a row group: at most 8 MB
 MAT_BYTES = 2**31 - 1  # limit of a file of version 5
 MAT_NAME = 63  # characters of the longest name in MATLAB
+MAT_KEYWORDS = frozenset({
+    "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if",
+    "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
+})  # fmt: skip
+"""Reserved words of MATLAB: no name may be one of them."""
 
 
 def export(
@@ -153,9 +158,10 @@ def _facts(result: Reader, train: int) -> dict[str, Any]:
 
 
 def _matlab_name(name: str, taken: dict[str, Any]) -> str:
-    """Valid and unused MATLAB name: letters, digits and underscores, beginning with a letter, at most 63 characters."""
+    """Valid and unused MATLAB name: letters, digits and underscores, beginning with a letter, no reserved word."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
-    plain = (plain if plain[:1].isalpha() else f"x{plain}")[:MAT_NAME]
+    is_name = plain[:1].isalpha() and plain not in MAT_KEYWORDS
+    plain = (plain if is_name else f"x{plain}")[:MAT_NAME]
     stem, count = plain[: MAT_NAME - 4], 2
     while plain in taken:
         plain, count = f"{stem}_{count}", count + 1

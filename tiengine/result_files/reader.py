@@ -24,7 +24,9 @@ from tiengine.result_files.journal import journal_of
 __all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "RUNNING", "Reader", "open_file", "open_reader"]
 
 FORMAT = "tiengine"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+"""Of the files that are written. In version 1 every train also had a dataset ``time``, that of its group ``wheel``."""
+READABLE_VERSIONS = (1, 2)
 COMPLETE = "complete"
 """Status of a train that has run its whole distance."""
 RUNNING = "running"
@@ -278,9 +280,10 @@ def _check_header(attributes: Any, path: Path | str) -> None:
     name, version = _plain(attributes.get("format")), _plain(attributes.get("format_version"))
     if not isinstance(name, str) or name != FORMAT:
         raise InputError(f"{path}: not a tiengine result (HDF5, but its attribute format is not {FORMAT!r})")
-    if not isinstance(version, int) or version != FORMAT_VERSION:
+    if not isinstance(version, int) or version not in READABLE_VERSIONS:
+        known = " and ".join(map(str, READABLE_VERSIONS))
         raise InputError(
-            f"{path}: format_version = {version}: this program reads {FORMAT_VERSION}; read it with the version of"
+            f"{path}: format_version = {version}: this program reads {known}; read it with the version of"
             f" tiengine that wrote it ({attributes.get('tiengine_version', 'unknown')}), or run its scenario again"
         )
 

@@ -22,6 +22,12 @@ SUMMARY = {
 }
 """Root attributes that are shown, each with its description and number format."""
 
+ENSEMBLE = {
+    "simulated_time": "simulated time, sum of all trains",
+    "real_time_factor": "real-time factor per train (wall time over the sum of simulated times)",
+}
+"""Descriptions that differ for an ensemble."""
+
 
 def summary(attributes: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Descriptions and formatted values of a run.
@@ -29,7 +35,12 @@ def summary(attributes: Mapping[str, Any]) -> list[tuple[str, str]]:
     Args:
         attributes: Root attributes of its result.
     """
-    return [(words, _formatted(form, attributes[key])) for key, (words, form) in SUMMARY.items() if key in attributes]
+    special = {} if str(attributes.get("trains", 1)) == "1" else ENSEMBLE
+    return [
+        (special.get(key, words), _formatted(form, attributes[key]))
+        for key, (words, form) in SUMMARY.items()
+        if key in attributes
+    ]
 
 
 def _formatted(form: str, value: Any) -> str:

@@ -1,16 +1,17 @@
-"""Writer of result files: streams a run to HDF5 (format version 1).
+"""Writer of result files: streams a run to HDF5 (format version 2).
 
 ::
 
     /                                   attributes: format, format_version, versions, scenario (TOML), ...
-    /trains/000                         attributes vehicles, seed, status, ...; time -> wheel/time
+    /trains/000                         attributes vehicles, seed, status, ...
     /trains/000/wheel                   and other groups of channels, see result_files.layout
     /trains/000/gauges/NAME             one group per gauge; attributes on, chainage, side or y
     /trains/000/events                  table of events, see result_files.event_table
 
 Every group holds its own coordinates as dimension scales: ``time`` [s], ``position`` [m] (chainage of the first
 vehicle's centre) and its labels; ``seats`` and ``slabs`` have their index and ``chainage`` [m] instead. Groups sampled
-together share ``time`` and ``position`` by hard links. Times and chainages are float64, channels float32 or float64.
+together share ``time`` and ``position`` by hard links. No coordinate stands above these groups: in a
+tree of xarray, the groups below would have to share it. Times and chainages are float64, channels float32 or float64.
 
 The root attribute ``status`` is "running" until the run has ended.
 """
@@ -33,7 +34,7 @@ from tiengine.result_files.events import Event
 from tiengine.result_files.growing_dataset import GrowingDataset
 from tiengine.result_files.layout import CHUNK, DTYPES, Axis, Block, GroupSpec, TrainLabels
 from tiengine.result_files.output_file import DISK_ERRORS, OutputFile, header
-from tiengine.result_files.reader import Reader
+from tiengine.result_files.reader import FORMAT_VERSION, Reader
 
 __all__ = ["Writer"]
 
@@ -103,6 +104,11 @@ class Writer:
         writer = cls.__new__(cls)
         writer._take(OutputFile.resume(path), groups, precision)
         writer._samples_kept = True
+        try:
+            _upgrade(writer._file)
+        except BaseException:
+            writer.leave()
+            raise
         return writer
 
     def _take(self, output: OutputFile, groups: Mapping[str, GroupSpec], precision: str) -> None:
@@ -287,8 +293,6 @@ class Writer:
                 coordinates += _create_auxiliary(group, dimension, labels)
             for channel, meaning in spec.channels.items():
                 self._create_channel(group, channel, meaning, spec, coordinates)
-        if "wheel" in self._specs:
-            train["time"] = train["wheel/time"]
         create_events(train.create_group(EVENTS))
 
     def _create_channel(
@@ -302,6 +306,14 @@ class Writer:
         _describe(dataset, meaning).attrs["coordinates"] = " ".join(coordinates)
         for i, dimension in enumerate((spec.axis.name, *spec.dimensions)):
             dataset.dims[i].attach_scale(group[dimension])
+
+
+def _upgrade(file: Any) -> None:
+    """Convert a file of format version 1, which has a dataset ``time`` in every train, to the current version."""
+    for train in file["trains"].values():
+        if "time" in train:
+            del train["time"]
+    file.attrs["format_version"] = FORMAT_VERSION
 
 
 def _create_axis(group: Any, axis: Axis) -> None:

@@ -21,7 +21,7 @@ from pydantic.fields import FieldInfo
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION, GROUPS
 from tiengine.result_files.layout import DIMENSIONS, GAUGE_DIMENSIONS
 from tiengine.scenario.key_checks import NumberOr
-from tiengine.scenario.parts import ProfilePoints
+from tiengine.scenario.profile_part import ProfilePoints
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.fastening import Fastening
 from tiengine.track.mortar import Mortar

@@ -1,8 +1,7 @@
 """Parts of a scenario: vehicles, rail, slab, fastening and profiles from names, paths and tables.
 
 A named part is looked up among the scenario's own presets first, then in the library, or read from its path.
-A profile's table holds ``points``, the text of its two columns (y and z in mm), so that a resolved scenario
-needs no other files.
+Loading copies every preset and file into the scenario, so that a resolved scenario needs no other files.
 """
 
 from __future__ import annotations
@@ -11,20 +10,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
-from tiengine.contact.profile import ROUNDING_LENGTH, Profile
-from tiengine.contact.profile_files import MOST_POINTS, read_profile
-from tiengine.contact.profile_frame import placed
+from tiengine.contact.point_list import Kind
+from tiengine.contact.profile import Profile
 from tiengine.parameters.errors import InputError, nearest
-from tiengine.parameters.input_files import load_toml, numbers_of
+from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import KINDS, find_preset
-from tiengine.parameters.quantity import Name, Params, Q, Source, build
+from tiengine.parameters.quantity import build
 from tiengine.scenario.part import Presets
+from tiengine.scenario.profile_part import build_profile, profile_table
 from tiengine.track.fastening import Fastening
 from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail
@@ -35,20 +33,6 @@ if TYPE_CHECKING:
     from tiengine.scenario.tables import Track, Train
 
 __all__ = ["Parts", "build_parts", "collect_presets"]
-
-
-class ProfilePoints(Params):
-    """A wheel's or a rail's profile as a table."""
-
-    name: Name = "profile"
-    source: Source = ""
-    points: Annotated[str, Field(description="y and z in mm, one pair per line")]
-    has_cant: Annotated[bool, Field(description="the points are those of a rail already inclined")] = False
-    smoothing: Annotated[float, Q("m", "length of the smoothing spline", ge=0, le=5e-3)] = ROUNDING_LENGTH
-    mirror: Annotated[bool | None, Field(description="whether the rail's gauge face is at positive y")] = None
-    tape_circle: Annotated[
-        float, Q("m", "distance of a wheel's tape circle outward from the points' y = 0", ge=-0.2, le=0.2)
-    ] = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +91,7 @@ def collect_presets(train: Train, track: Track, presets: Presets, folder: Path |
             raise InputError(f"presets.{kind}: unknown kind of preset{nearest(kind, KINDS)}")
     found = {kind: dict(tables) for kind, tables in presets.items()}
     for where, kind, part in _references(train, track):
+        stated: dict[str, Any] = {} if isinstance(part, str) else part
         name = part if isinstance(part, str) else part.get("like")
         tables = found.setdefault(kind, {})
         seen: set[Any] = set()
@@ -117,7 +102,8 @@ def collect_presets(train: Train, track: Track, presets: Presets, folder: Path |
                 raise InputError(f"{where} = {name!r}: is defined in terms of itself")
             seen.add(name)
             if name not in tables:
-                tables[name] = _read(where, kind, name, folder)
+                tables[name] = _read(where, kind, name, folder, stated)
+            stated = {**tables[name], **stated}
             name = tables[name].get("like")
     return found
 
@@ -146,16 +132,18 @@ def build_parts(train: Train, track: Track, presets: Presets) -> Parts:
     slab_table = tables["track.slab"]
     mortar_table = slab_table.pop("mortar", None)
     if not isinstance(mortar_table, dict):
-        raise InputError("track.slab.mortar: missing; a table of the bed's properties is required")
+        raise InputError(
+            "track.slab.mortar: missing; a table of the bed's properties is required, or like = the name of a preset"
+        )
     mortar = build(Mortar, mortar_table, "track.slab.mortar")
     if track.mortar_no_tension:
         mortar = mortar.model_copy(update={"no_tension": True})
     return Parts(
         vehicles=tuple(vehicles),
         centres=_centres(vehicles, train),
-        wheel=_profile(tables["train.wheel_profile"], "train.wheel_profile", "wheel"),
+        wheel=build_profile(tables["train.wheel_profile"], "train.wheel_profile", "wheel"),
         rail=build(Rail, tables["track.rail"], "track.rail"),
-        rail_profile=_profile(tables["track.rail_profile"], "track.rail_profile", "rail"),
+        rail_profile=build_profile(tables["track.rail_profile"], "track.rail_profile", "rail"),
         slab=build(Slab, slab_table, "track.slab"),
         mortar=mortar,
         fastening=build(Fastening, tables["track.fastening"], "track.fastening"),
@@ -173,13 +161,13 @@ def _references(train: Train, track: Track) -> Iterator[tuple[str, str, str | di
     yield "track.fastening", "fastenings", track.fastening
 
 
-def _read(where: str, kind: str, name: Any, folder: Path | None) -> dict[str, Any]:
-    """Table of a preset or file."""
+def _read(where: str, kind: str, name: str, folder: Path | None, stated: Mapping[str, Any]) -> dict[str, Any]:
+    """Table of a preset or file, of which the scenario states some keys itself."""
     path = find_preset(kind, name, folder=folder, called=where)
     if path.suffix == ".toml":
         return load_toml(path)
-    found = read_profile(path, "wheel" if where == "train.wheel_profile" else "rail", f"{where} = {name!r}")
-    return {"name": path.stem, "points": "\n".join(f"{y:.12g} {z:.12g}" for y, z in found.points)}
+    body: Kind = "wheel" if where == "train.wheel_profile" else "rail"
+    return profile_table(path, body, f"{where} = {name!r}", stated)
 
 
 def _resolved(kind: str, part: str | dict[str, Any], presets: Presets) -> dict[str, Any]:
@@ -204,27 +192,6 @@ def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
         merged[key] = _merged(merged[key], value) if both else value
     return merged
-
-
-def _profile(table: dict[str, Any], where: str, kind: Literal["wheel", "rail"]) -> Profile:
-    """Build a profile from its table."""
-    stated = build(ProfilePoints, table, where)
-    rows = [numbers_of(line.replace(",", " ").replace(";", " ").split()) for line in stated.points.strip().splitlines()]
-    if len(rows) > MOST_POINTS:
-        raise InputError(f"{where}: {len(rows)} points; at most {MOST_POINTS} expected")
-    if not all(row is not None and len(row) == 2 for row in rows):
-        raise InputError(f"{where}: every line of its points must hold two numbers, y and z in mm")
-    points = np.array(rows, dtype=np.float64).reshape(-1, 2)
-    points = placed(
-        points,
-        kind,
-        where,
-        has_cant=stated.has_cant,
-        smoothing=stated.smoothing,
-        mirror=stated.mirror,
-        tape_circle=stated.tape_circle,
-    )
-    return Profile(stated.name, kind, points[:, 0].copy(), points[:, 1].copy(), stated.has_cant, stated.smoothing)
 
 
 def _centres(vehicles: list[Vehicle], train: Train) -> NDArray[np.float64]:

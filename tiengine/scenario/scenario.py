@@ -16,7 +16,9 @@ import numpy as np
 import tomli_w
 from pydantic import Field
 
-from tiengine.irregularity.irregularity import IrregularityParams, check_step
+from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.track_checks import check_wave
+from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples, user_path
 from tiengine.parameters.presets import find_preset
@@ -28,15 +30,21 @@ from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
 from tiengine.track.defects import check_defects
+from tiengine.track.knots import graded_knots
+from tiengine.track.seat_points import seat_points
+from tiengine.track.sines import Sines
+from tiengine.track.splines import Splines
 from tiengine.vehicle.train import centre_in_window
 
 __all__ = ["Scenario", "check_wavelength", "duration", "load_scenario", "to_toml"]
 
-WINDOW_MARGIN = 4.0  # m beyond the outer wheels at either end of the window "auto", see Numerics
+WINDOW_MARGIN = 8.0  # m beyond the outer wheels at either end of the window "auto", see Numerics
 WINDOW_MARGIN_LEAST = 2.0  # m: closer window ends or absorbing zones change the outer wheels' forces
 LONGEST_RUN = 1e6  # s: the longest distance at 1 m/s
 LONGEST_WINDOW = 2000.0  # m
-MOST_MODES = 3000  # of each rail field: the matrices of a rail then take 2 GB
+MOST_MODES = 3000  # sines of each rail field: the matrices of a rail then take 2 GB
+MOST_KNOTS = 20_000
+MOST_SPANS_OF_SEAT = 3  # that the points of a seat may reach over: a seat then touches seven splines
 
 
 class Scenario(Params):
@@ -89,9 +97,13 @@ class Scenario(Params):
         return centre_in_window(self.window_length, self.parts.wheelset_positions)
 
     @cached_property
-    def modes(self) -> int:
-        """Trial functions of each rail field."""
-        return self.numerics.modes(self.window_length)
+    def trial_functions(self) -> Splines | Sines:
+        """Trial functions of the rails."""
+        length = self.window_length
+        if self.numerics.trial_functions == "sines":
+            return Sines(length, self.numerics.modes(length))
+        wheels = self.centre_in_window + self.parts.wheelset_positions
+        return Splines(graded_knots(length, wheels, self.numerics.knots))
 
 
 def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Overrides = ()) -> Scenario:
@@ -116,7 +128,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
         path = find_preset("scenarios", str(source), called="scenario")
         folder, tables = path.parent, load_toml(path)
         tables.setdefault("name", path.stem)
-    tables = _absolute(apply_overrides(tables, overrides), folder)
+    tables = _absolute(apply_overrides(tables, overrides, Scenario), folder)
     scenario = build(Scenario, tables)
     ensemble = _absolute_vary(scenario.ensemble, folder)
     presets = collect_presets(scenario.train, scenario.track, scenario.presets, folder)
@@ -133,7 +145,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
 def _changed(tables: dict[str, Any], ensemble: Ensemble, train: int) -> Scenario:
     """Scenario of one train, from the tables of the ensemble."""
     try:
-        return build(Scenario, apply_overrides({**tables, "ensemble": {}}, ensemble.changes(train)))
+        return build(Scenario, apply_overrides({**tables, "ensemble": {}}, ensemble.changes(train), Scenario))
     except InputError as error:
         raise InputError(f"train {train} of the ensemble: {error}") from None
 
@@ -221,16 +233,19 @@ def _check(scenario: Scenario) -> None:
             f"numerics.window = {window:g}: window shorter than the train; must be at least {least:g} m"
             f" (wheels over {parts.wheel_span:g} m and {WINDOW_MARGIN_LEAST:g} m at either end)"
         )
-    if window > LONGEST_WINDOW or scenario.modes > MOST_MODES:
-        raise InputError(
-            f"numerics.window: {window:g} m with {scenario.modes} modes: must be at most {LONGEST_WINDOW:g} m and"
-            f" {MOST_MODES} modes; choose a shorter train or a smaller numerics.modes_per_metre"
-        )
+    _check_trial_functions(scenario)
     duration = scenario.train.distance / min(scenario.train.speed.speed)
     if duration > LONGEST_RUN:
         raise InputError(
             f"train.speed_kmh: {scenario.train.distance:g} m take up to {duration:.3g} s;"
             f" must be at most {LONGEST_RUN:g} s"
+        )
+    begin = scenario.rear + scenario.centre_in_window
+    adhesion = scenario.train.speed.largest_acceleration(begin, begin + scenario.train.distance) / GRAVITY
+    if scenario.train.effort == "wheels" and adhesion >= scenario.track.friction:
+        raise InputError(
+            f"train.speed_kmh: needs an adhesion of {adhesion:.3g}; must be below track.friction ="
+            f" {scenario.track.friction:g} for wheels that brake or drive (train.effort)"
         )
     zone, widest = scenario.numerics.absorbing_zone, 0.5 * (window - least)
     if zone > widest + 1e-9:
@@ -257,6 +272,27 @@ def _check(scenario: Scenario) -> None:
     )
 
 
+def _check_trial_functions(scenario: Scenario) -> None:
+    """Check how many trial functions describe a rail, and that seats do not reach over too many of them."""
+    window, numerics = scenario.window_length, scenario.numerics
+    sines = numerics.trial_functions == "sines"
+    most, fewer = (MOST_MODES, "numerics.modes_per_metre") if sines else (MOST_KNOTS, "density of numerics.knots")
+    count = numerics.modes(window) if sines else int(window / numerics.knots.finest)
+    if window > LONGEST_WINDOW or count > most:
+        raise InputError(
+            f"numerics.window: {window:g} m with {count} functions a field: must be at most {LONGEST_WINDOW:g} m and"
+            f" {most} functions; choose a shorter train or a smaller {fewer}"
+        )
+    functions, length = scenario.trial_functions, scenario.parts.fastening.length
+    if isinstance(functions, Splines):
+        spans = functions.spans_within(float(np.ptp(seat_points(length)[0])))
+        if spans > MOST_SPANS_OF_SEAT:
+            raise InputError(
+                f"track.fastening.length = {length:g}: the points of a seat reach over {spans} knots, must reach over"
+                f" {MOST_SPANS_OF_SEAT} at most; choose a larger numerics.knots.finest"
+            )
+
+
 def check_wavelength(scenario: Scenario, step: float) -> None:
     """Refuse irregularity that a step cannot follow.
 
@@ -274,7 +310,7 @@ def check_wavelength(scenario: Scenario, step: float) -> None:
     if irregularity.short_wave:
         shortest["short_wave_min"] = irregularity.short_wave_min
     for key, wavelength in shortest.items():
-        check_step(wavelength, scenario.train.speed.fastest, step, f"irregularity.{key}")
+        check_wave(f"irregularity.{key}", wavelength, scenario.train.speed.fastest, step)
 
 
 def duration(train: Scenario) -> float:

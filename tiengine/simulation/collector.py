@@ -65,6 +65,7 @@ class Collector:
         self.ended: set[int] = set()
         self._path = path
         self.notify: Notify = notify or (lambda words: None)
+        self._told: set[str] = set()
         self._committed, self._pause = time.perf_counter(), FLUSH_SECONDS
         self.failed: dict[int, str] = {}
         self.refused: set[int] = set()
@@ -172,6 +173,9 @@ class Collector:
         for train, known in begun.facts.items():
             self._writer.add(train, begun.labels, known | {"status": RUNNING})
             self._facts[train] |= known
+            if (words := str(known.get("irregularity_file", ""))) and words not in self._told:
+                self._told.add(words)
+                self.notify(words)
             if saved is not None:
                 self._writer.rewind(train, saved.facts["rows"][str(train)])
 

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from tiengine.engine.time_step import AUTO_STEPS, prepare
 from tiengine.irregularity.track_function import TrackFunction, TrackFunctions, recorded_name, track_functions
+from tiengine.parameters.cache_folders import ensure_cache_folders
 from tiengine.parameters.errors import InputError, RunFailedError, RunStoppedError
 from tiengine.recording.recorder import Recorder
 from tiengine.recording.trackside import trackside_groups
@@ -92,6 +93,7 @@ def run(
     if path is not None:
         check_output(path, force)
         check_space(scenario, path)
+    ensure_cache_folders(notify)
     job = _Job(scenario, path, workers, checkpoint, stop, public_launch)
     job.check(tasks)
     groups = _groups(scenario)
@@ -131,6 +133,7 @@ def resume(
     path = Path(file)
     with open_result(path) as result:
         scenario = result.scenario
+    ensure_cache_folders(notify)
     functions = () if irregularity is None else track_functions(irregularity, len(scenario.members))
     tasks = plan(scenario, functions=functions)
     job = _Job(scenario, path, workers, checkpoint, stop, False)
@@ -221,6 +224,8 @@ def _groups(scenario: Scenario) -> dict[str, GroupSpec]:
 
 
 def _workers(scenario: Scenario) -> int:
-    """Processes: one per core, divided by the threads of each."""
+    """Processes: one per core, divided by the threads of each; splines use one thread."""
+    numerics = scenario.numerics
+    threads = numerics.threads if numerics.trial_functions == "sines" else 1
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(cores // scenario.numerics.threads, 1)
+    return max(cores // threads, 1)

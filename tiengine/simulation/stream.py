@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from tiengine.model.model import Ingredients
+from tiengine.irregularity.irregularity import Irregularity
+from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.checkpoint import Checkpoint
 from tiengine.simulation.messages import Begun, Costs, Ended, Lost, Message, Paused, Saved
@@ -54,7 +55,7 @@ def run_task(
         yield Lost(task.trains, str(error), refused=True)
         return
     setup = time.perf_counter() - clock - run.jit
-    yield Begun(task.number, run.labels, facts_at_start(task, run.stepper.ingredients))
+    yield Begun(task.number, run.labels, facts_at_start(task, run.stepper.ingredients, run.tracks))
     before = 0.0 if saved is None else float(saved.facts["loop"])
     clock = last = time.perf_counter()
     try:
@@ -74,7 +75,12 @@ def run_task(
     yield Ended(task.number, run.ends(loop), Costs(os.getpid(), run.jit, setup, loop, peak_memory()))
 
 
-def facts_at_start(task: Task, ingredients: Ingredients) -> dict[int, dict[str, Any]]:
+def _functions(ingredients: Ingredients) -> dict[str, int]:
+    """Trial functions of a rail field: sines are modes."""
+    return {"modes" if ingredients.grading is None else "functions": ingredients.functions.count}
+
+
+def facts_at_start(task: Task, ingredients: Ingredients, tracks: Sequence[Irregularity]) -> dict[int, dict[str, Any]]:
     """Facts of each train that are known from the start, by its number."""
     shared = {
         **{f"dofs_{name}": count for name, count in ingredients.dof_counts.items() if name != "total"},
@@ -82,8 +88,13 @@ def facts_at_start(task: Task, ingredients: Ingredients) -> dict[int, dict[str, 
         "time_step": ingredients.newmark.dt,
         "passes": ingredients.passes,
         "window_length": ingredients.length,
-        "modes": ingredients.modes,
+        **_functions(ingredients),
         "slabs": ingredients.slots,
         "seats_in_window": ingredients.seats,
     }
-    return {number: {**shared, "seed": task.tracks[b].seed} for b, number in enumerate(task.trains)}
+    facts: dict[int, dict[str, Any]] = {}
+    for b, number in enumerate(task.trains):
+        facts[number] = {**shared, "seed": task.tracks[b].seed}
+        if tracks[b].description:
+            facts[number]["irregularity_file"] = tracks[b].description
+    return facts

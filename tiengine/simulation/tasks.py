@@ -12,7 +12,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tiengine.irregularity.irregularity import IrregularityParams, shortest_wavelength
+from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.track_checks import shortest_wavelength
 from tiengine.irregularity.track_function import TrackFunction, recorded_name
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario, to_toml

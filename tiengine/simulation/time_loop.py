@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium, release
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper, state_at_rest
+from tiengine.engine.state import State
 from tiengine.engine.stepper import Stepper
 from tiengine.engine.time_step import prepare
-from tiengine.irregularity.irregularity import Irregularity, check_reach, make_irregularity
-from tiengine.model.model import Model
+from tiengine.irregularity.irregularity import Irregularity, make_irregularity
+from tiengine.irregularity.track_checks import check_reach
+from tiengine.model.constant_data import Model
 from tiengine.recording.guards import Guard
 from tiengine.recording.recorder import Recorder
 from tiengine.recording.trackside import Trackside
@@ -121,11 +122,11 @@ class Run:
         """
         scenario, ingredients = task.scenario, model.ingredients
         recorder = Recorder(scenario, ingredients.newmark.dt)
-        state = SineState.at_rest(model) if at_rest else _started(scenario, model)
+        state = state_at_rest(model) if at_rest else _started(scenario, model)
         rows = (CHUNK_STEPS // every + 1 for every in (recorder.wheel_every, recorder.body_every))
         chunk = Chunk.empty(ingredients, CHUNK_STEPS, *rows)
         parallel = scenario.numerics.threads > 1 and task.size > 1
-        stepper = SineStepper(model, state, chunk, parallel=parallel, public=public)
+        stepper = make_stepper(model, state, chunk, parallel=parallel, public=public)
         jit = stepper.compile()
         trackside = Trackside.watching(scenario, stepper)
         lead = scenario.rear + float(ingredients.wheel_s.max())
@@ -233,9 +234,9 @@ class Run:
         }
 
 
-def _started(scenario: Scenario, model: Model) -> SineState:
+def _started(scenario: Scenario, model: Model) -> State:
     """State of the trains at t = 0."""
-    state = SineState.at_rest(model)
+    state = state_at_rest(model)
     if scenario.numerics.start == "equilibrium":
         equilibrium(model, state, scenario.rear, *scenario.train.speed.at(scenario.rear + model.ingredients.centre_s))
     else:

@@ -1,4 +1,4 @@
-"""Rail fastenings: parameters and constant tables of the trial functions at the seats (MODEL §3)."""
+"""Rail fastenings: parameters and constant tables of the sines at the seats (MODEL §3)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.parameters.quantity import Name, Params, Q, Source
+from tiengine.track.seat_points import mean_cosine
 
 __all__ = ["Fastening", "seat_count", "seat_tables"]
 
@@ -21,6 +22,7 @@ class Fastening(Params):
     lateral_stiffness: Annotated[float, Q("N/m", "k_l", gt=0)]
     vertical_damping: Annotated[float, Q("N s/m", "c_v", ge=0)]
     lateral_damping: Annotated[float, Q("N s/m", "c_l", ge=0)]
+    length: Annotated[float, Q("m", "of rail on which the pad presses, evenly; 0 for a point", ge=0, le=0.4)] = 0.15
 
 
 def seat_count(length: float, spacing: float) -> int:
@@ -28,17 +30,21 @@ def seat_count(length: float, spacing: float) -> int:
     return int(np.ceil(length / spacing - 1e-9)) + 1
 
 
-def seat_tables(modes: int, length: float, spacing: float) -> NDArray[np.float64]:
-    """Tabulate the constant factors of the trial functions at the seats.
+def seat_tables(modes: int, length: float, spacing: float, seat_length: float = 0.0) -> NDArray[np.float64]:
+    """Tabulate the constant factors of the sines at the seats.
 
     Args:
         modes: Modes N per field.
         length: Window l [m].
         spacing: Seat pitch d [m].
+        seat_length: Length of rail on which a seat presses [m].
 
     Returns:
-        cos(k_i j d) for i = 1..N, then sin(k_i j d), with k_i = i pi / l; shape (2 N, seats).
+        cos(k_i j d) for i = 1..N, then sin(k_i j d), with k_i = i pi / l, times the factor by which the mean over a
+        seat's length reduces them; shape (2 N, seats).
     """
-    k = np.arange(1, modes + 1) * np.pi / length
+    k = np.asarray(np.arange(1, modes + 1) * np.pi / length, np.float64)
     phase = np.outer(k, np.arange(seat_count(length, spacing)) * spacing)
-    return np.vstack([np.cos(phase), np.sin(phase)])
+    mean = np.tile(mean_cosine(k, seat_length), 2)[:, None]
+    table: NDArray[np.float64] = np.vstack([np.cos(phase), np.sin(phase)]) * mean
+    return table

@@ -84,6 +84,11 @@ class Splines:
         spans = len(self.knots) - 1
         return np.clip(np.arange(spans) - 1, 0, self.count - TOUCHED).astype(np.int32)
 
+    def spans_within(self, length: float) -> int:
+        """Most knots that a length of rail [m] within the window lies over."""
+        inner = self.knots[1:-1]
+        return int((np.searchsorted(inner, inner + length, side="right") - np.arange(len(inner))).max())
+
     def seats(self, length: float) -> Pieces:
         """Mean of phi over a seat of a length [m] by the place of its middle; 0 for a point."""
         if length == 0.0:

@@ -24,7 +24,7 @@ from tiengine.track.fastening import Fastening
 from tiengine.track.rail_operators import RailOperators
 from tiengine.track.slab_matrices import SlabMatrices
 
-__all__ = ["SeatsInWindow", "SteadyTrack"]
+__all__ = ["RIGID_GROUND", "SeatsInWindow", "SteadyTrack"]
 
 
 RIGID_GROUND = -1

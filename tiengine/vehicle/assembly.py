@@ -14,15 +14,18 @@ moment. The part of x due to u is neglected, as in K (no longitudinal degree of 
 
 Spin. A wheelset's pitch is measured from its spin -V/r0, J (pitch'' - Vdot/r0) = moment: hence +J Vdot/r0.
 
-Effort. The force that changes the speed acts at the axles (``"axles"``: creep forces carry only the wheelsets' spin),
-or at the wheels' rims (``"wheels"``: every wheelset gets the torque -(m_s r0 + J/r0) Vdot and its frame the
-reaction, so that creep forces carry m_s Vdot with m_s its equal share of the vehicle's mass).
+Effort. Brakes and motors turn the wheelsets (``"wheels"``): every wheelset gets the torque (m_s r0 + J/r0) Vdot against
+its pitch, with m_s its equal share of the mass of the vehicle, and the bodies that guide it the reaction, in
+proportion to their longitudinal stiffness. The wheelset then rolls at the creepage at which the creep forces of its
+wheels are m_s Vdot. Or the force acts at the axles (``"axles"``), as from a linear motor or a coupler at their height:
+creep forces carry only the spin of the wheelsets. The moments of the two about the rail differ by m_s r0 + J/r0 per
+wheelset.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +34,14 @@ from tiengine.parameters.errors import InputError
 from tiengine.vehicle.connector import Body, Damper, Direction, Joint, Spring, end_motion
 from tiengine.vehicle.vehicle import Vehicle
 
-__all__ = ["Assembly", "Element", "PlacedBody", "longitudinal_push", "spin_push"]
+__all__ = ["Assembly", "Effort", "Element", "PlacedBody", "longitudinal_push", "spin_push"]
 
 _AXES: dict[Direction, int] = {"x": 0, "y": 1, "z": 2}
 _FORCE_OF_RATE, _FORCE_OF_ELONGATION = 0, 1
+
+
+Effort = Literal["wheels", "axles"]
+"""Where the force that changes the speed acts."""
 
 
 class PlacedBody(NamedTuple):
@@ -212,11 +219,11 @@ def spin_push(full: Assembly, vehicles: Sequence[Vehicle], effort: str) -> NDArr
         if effort == "wheels":
             torque = vehicles[k].mass / len(vehicles[k].axle_positions) * r0 + body.Jy / r0
             push[6 * i + 4] -= torque
-            push[6 * _guide(full, i) + 4] += torque
+            push[4 : full.first_internal : 6] += torque * _guides(full, i)
     return push
 
 
-def _guide(full: Assembly, wheelset: int) -> int:
-    """Body that guides a wheelset: the one with the stiffest longitudinal spring to it."""
-    coupling = -full.K_push[6 * wheelset, 0 : full.first_internal : 6]
-    return int(np.argmax(coupling))
+def _guides(full: Assembly, wheelset: int) -> NDArray[np.float64]:
+    """Shares of the bodies in guiding a wheelset: those of their longitudinal springs to it, shape (bodies,)."""
+    stiffness = np.maximum(-full.K_push[6 * wheelset, 0 : full.first_internal : 6], 0.0)
+    return np.asarray(stiffness / stiffness.sum(), dtype=np.float64)

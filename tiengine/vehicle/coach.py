@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from tiengine.parameters.conventions import SIDES
 from tiengine.parameters.quantity import Name, Params, Q, Source
@@ -24,6 +24,7 @@ from tiengine.vehicle.connector import (
     Spring,
     Stiffness,
     Stop,
+    VehicleClass,
     check_damper,
     check_stop,
 )
@@ -238,6 +239,7 @@ class Coach(Params):
 
     name: Name
     source: Source = ""
+    vehicle_class: Annotated[VehicleClass, Field(description="selects the limits of indices")] = "coach"
     series_springs: SeriesSprings = False
     geometry: Geometry
     car: Inertia
@@ -278,6 +280,7 @@ def expand(coach: Coach) -> dict[str, Any]:
     return {
         "name": coach.name,
         "source": coach.source,
+        "vehicle_class": coach.vehicle_class,
         "series_springs": coach.series_springs,
         "wheel_radius": geometry.wheel_radius,
         "half_span_contact": geometry.half_span_contact,

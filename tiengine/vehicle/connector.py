@@ -29,6 +29,7 @@ __all__ = [
     "SeriesSprings",
     "Spring",
     "Stop",
+    "VehicleClass",
     "check_damper",
     "check_stop",
     "end_motion",
@@ -45,6 +46,10 @@ Direction = Literal["x", "y", "z"]
 SeriesSprings = Annotated[
     bool, Field(description="springs in series with dampers (k_series) are modelled, with internal states")
 ]
+
+
+VehicleClass = Literal["coach", "locomotive", "freight"]
+"""Classes of vehicles for which the standards set different limits; multiple units count as coaches."""
 
 
 class Body(Params):

@@ -69,6 +69,18 @@ class SpeedProfile:
         """Highest speed [m/s]; the curve between two points stays between their speeds."""
         return float(self.speed.max())
 
+    def largest_acceleration(self, first: float, last: float) -> float:
+        """Largest magnitude of dV/dt [m/s^2] between two chainages [m]: of dT/dx, a parabola between two points."""
+        largest = 0.0
+        for (start, _, c1, c2, c3), end in zip(self._pieces[1:], self._nodes[1:], strict=False):
+            low, high = max(first, start) - start, min(last, end) - start
+            if low > high:
+                continue
+            vertex = -c2 / (3.0 * c3) if c3 else 0.0
+            for s in (low, min(max(vertex, low), high), high):
+                largest = max(largest, abs(c1 + s * (2.0 * c2 + s * 3.0 * c3)))
+        return largest
+
     def at(self, x: float) -> tuple[float, float]:
         """Speed [m/s] and acceleration [m/s^2] at chainage x [m]."""
         start, c0, c1, c2, c3 = self._pieces[bisect_right(self._nodes, x)]

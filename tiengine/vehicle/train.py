@@ -17,14 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
-from tiengine.vehicle.assembly import Assembly, Element, PlacedBody, longitudinal_push, spin_push
+from tiengine.vehicle.assembly import Assembly, Effort, Element, PlacedBody, longitudinal_push, spin_push
 from tiengine.vehicle.connector import extend_table
 from tiengine.vehicle.vehicle import Vehicle
 
@@ -116,7 +115,7 @@ def assemble(
     centres: NDArray[np.float64] | None = None,
     *,
     series_springs: bool | None = None,
-    effort: Literal["axles", "wheels"] = "axles",
+    effort: Effort = "wheels",
 ) -> TrainModel:
     """Assemble the matrices and nonlinear elements of a train.
 

@@ -20,7 +20,7 @@ from tiengine.parameters.input_files import load_toml, to_tuples
 from tiengine.parameters.presets import find_preset, preset_names
 from tiengine.parameters.quantity import Name, Params, Q, Source, build
 from tiengine.vehicle.coach import Coach, expand
-from tiengine.vehicle.connector import Body, Damper, SeriesSprings, Spring, Stop
+from tiengine.vehicle.connector import Body, Damper, SeriesSprings, Spring, Stop, VehicleClass
 
 __all__ = ["Vehicle", "load_vehicle", "vehicle_from_table", "vehicle_names"]
 
@@ -30,6 +30,9 @@ class Vehicle(Params):
 
     name: Name
     source: Source = ""
+    vehicle_class: Annotated[
+        VehicleClass | None, Field(description="selects the limits of indices; without it only those of all vehicles")
+    ] = None
     wheel_radius: Annotated[float, Q("m", "r0", gt=0)]
     half_span_contact: Annotated[float, Q("m", "b0, half distance of the tape circles", gt=0)]
     length_over_couplers: Annotated[float, Q("m", "default pitch of the vehicles of a train", gt=0)]

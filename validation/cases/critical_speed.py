@@ -73,18 +73,20 @@ class Setting:
         vehicle: Preset.
         contact: Overrides of the profiles.
         without_dampers: Whether the yaw dampers are removed.
+        series: Whether all springs in series with dampers are modelled; else as the preset states.
     """
 
     vehicle: str
     contact: tuple[str, ...] = CHINA
     without_dampers: bool = False
+    series: bool = True
 
     @property
     def overrides(self) -> tuple[str, ...]:
         """Changes of the built-in scenario "smooth"."""
         weak = WEAK[self.vehicle] if self.without_dampers else ()
         dampers = tuple(f"train.vehicles.0.yaw_damper.{key}" for key in weak)
-        vehicle = (f'train.vehicles=["{self.vehicle}"]', "train.series_springs=true")
+        vehicle = (f'train.vehicles=["{self.vehicle}"]', f"train.series_springs={str(self.series).lower()}")
         return (*vehicle, *self.contact, *dampers)
 
 
@@ -145,6 +147,7 @@ def linear(setting: Setting) -> tuple[float, float]:
 
 
 DELIVERED = tuple(Setting(name) for name in ("CRH380A_v2", "CRH380A_v6", "Zhai_coach"))
+SHIPPED = tuple(Setting(name, series=False) for name in ("CRH2", "CRH380A_v2", "CRH380A_v6", "Zhai_coach"))
 WITHOUT = tuple(Setting(setting.vehicle, without_dampers=True) for setting in DELIVERED)
 CONICITY = tuple(
     (Setting(*given), Setting(given[0], EUROPE, given[2]))
@@ -262,6 +265,7 @@ CASES = (
         quick=False,
     ),
     _row("hunting-delivered", ", ".join(setting.vehicle for setting in DELIVERED) + " on LMA/CHN60", DELIVERED),
+    _row("hunting-shipped", ", ".join(setting.vehicle for setting in SHIPPED) + " as shipped", SHIPPED),
     _row("hunting-no-yaw-dampers", "the same without yaw dampers", WITHOUT),
     _row("hunting-LMA", "CRH2 and CRH380A_v6 without yaw dampers on LMA/CHN60", tuple(low for low, _ in CONICITY)),
     _row("hunting-S1002", "the same on S1002/60E1, and Manchester", (*(high for _, high in CONICITY), MANCHESTER)),

@@ -31,8 +31,9 @@ from tiengine.engine.sine_stepper import SineStepper
 from tiengine.engine.stepper import Stage
 from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
-from tiengine.model.model import Ingredients, Model, build_model
+from tiengine.model.ingredients import Ingredients
 from tiengine.model.newmark import Newmark
+from tiengine.model.sine_model import SineModel, build_sine_model
 from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import load_scenario
 from tiengine.track.rail import RailWindow
@@ -54,7 +55,7 @@ SOURCE = "infinite Timoshenko rail on discrete springs, Floquet transform"
 class _Loaded(SineStepper):
     """The engine's step with a load in the middle of the left rail, added to what its forces have left in F."""
 
-    def __init__(self, model: Model, state: SineState, chunk: Chunk) -> None:
+    def __init__(self, model: SineModel, state: SineState, chunk: Chunk) -> None:
         self.weight = 0.0
         self._shape = model.window.shape(np.array([model.ingredients.length / 2.0]))[0]
         super().__init__(model, state, chunk)
@@ -97,7 +98,7 @@ def _seats() -> Seats:
     return Seats(given.slab.fastening_pitch, given.fastening.vertical_stiffness, given.fastening.vertical_damping)
 
 
-def _prepare(model: Model, V: float, steps: int) -> tuple[SineState, Chunk, _Loaded, Reals]:
+def _prepare(model: SineModel, V: float, steps: int) -> tuple[SineState, Chunk, _Loaded, Reals]:
     """Weightless wheels over a lowered track, slabs far behind; window's rear end at every step."""
     model.vehicle_load[:] = 0.0
     state, chunk = SineState.at_rest(model), Chunk.empty(model.ingredients, steps, 1, 1)
@@ -121,7 +122,7 @@ def history(speed: int, length: float, modes: int, dt: float = 1e-4) -> History:
         dt: Step [s].
     """
     V, d = speed / 3.6, _seats().pitch
-    model = build_model(replace(_ingredients(), newmark=Newmark(dt), length=length, modes=modes), V)
+    model = build_sine_model(replace(_ingredients(), newmark=Newmark(dt), length=length, modes=modes), V)
     steps, last = (int(np.ceil(distance / (V * dt))) for distance in (RAMP + SETTLE + d, d))
     state, chunk, stepper, X = _prepare(model, V, steps)
     shape = model.window.shape(np.array([length / 2.0]))[0]

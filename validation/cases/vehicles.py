@@ -25,7 +25,7 @@ LOADS = {"CRH380A_v6": 65.0, "CRH380A_v2": 68.7, "Zhai_coach": 55.9, "CRH2": 61.
 
 
 def _train(name: str) -> TrainModel:
-    return assemble([load_vehicle(name)])
+    return assemble([load_vehicle(name)], series_springs=False)
 
 
 def _held(name: str) -> Reals:

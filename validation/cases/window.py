@@ -14,8 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.irregularity.irregularity import make_irregularity
 from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import Scenario, load_scenario
@@ -93,10 +92,10 @@ def _seats_of_window() -> Reals:
     scenario = _scenario()
     V, chosen = scenario.train.speed.fastest, np.array([*NEIGHBOURS, *VOID_SEATS])
     model, _ = prepare_window(scenario)
-    state = SineState.at_rest(model)
+    state = state_at_rest(model)
     equilibrium(model, state, scenario.rear, V)
     steps = int(scenario.train.distance / (V * FINE))
-    stepper = SineStepper(model, state, Chunk.empty(model.ingredients, steps, 1, 1))
+    stepper = make_stepper(model, state, Chunk.empty(model.ingredients, steps, 1, 1))
     X = scenario.rear + V * FINE * np.arange(1.0, steps + 1)
     stepper.load(X, np.full(steps, V), np.zeros(steps), np.zeros_like(stepper.chunk.irregularity))
     forces = np.zeros((steps, len(chosen)))
@@ -104,8 +103,9 @@ def _seats_of_window() -> Reals:
         for i in range(steps):
             stepper.step(i)
             place = chosen - state.first_seat
-            inside = (place >= 0) & (place < state.seat_force.shape[3])
-            forces[i, inside] = state.seat_force[0, 0, 0, place[inside]]
+            now = state.seat_forces[0, 0, 0]
+            inside = (place >= 0) & (place < len(now))
+            forces[i, inside] = now[place[inside]]
     return forces
 
 

@@ -66,7 +66,7 @@ def overhead(folder: Path, trains: int, repeats: int) -> Overhead:
         (task,) = plan(scenario)
         run = Run.begin(task)
         collector = Collector(scenario, writer, path)
-        collector.take(Begun(0, run.labels, facts_at_start(task, run.stepper.ingredients)))
+        collector.take(Begun(0, run.labels, facts_at_start(task, run.stepper.ingredients, run.tracks)))
         measure = _Measure(run, collector, writer)
         measure.block(3)
         plain, with_one = [], []

@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from tiengine.contact.table import ContactTable
 from tiengine.irregularity.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
-from tiengine.model.model import CONTACT_TOLERANCE, Ingredients
+from tiengine.model.constant_data import CONTACT_TOLERANCE
+from tiengine.model.ingredients import Ingredients
 from tiengine.model.newmark import Newmark
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
@@ -184,7 +185,7 @@ def build_track(
         modes=modes,
         first_slab=first_slab,
         rear=first_slab * given.slab.pitch,
-        transform=SeatTransform.of(seats, modes),
+        transform=SeatTransform.of(seats, modes, given.fastening.length / d),
         stiffness=stiffness,
         mass=mass,
         inverse=_rail_inverse(stiffness, mass, numbers, given.newmark),

@@ -18,7 +18,8 @@ import numpy as np
 from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.sine_state import SineState
 from tiengine.kernels import layout as at
-from tiengine.model.model import Ingredients, build_model
+from tiengine.model.ingredients import Ingredients
+from tiengine.model.sine_model import build_sine_model
 from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import Scenario
 from validation.msm.model import FullTrack
@@ -44,7 +45,7 @@ def steady_rolling(track: FullTrack, state: FullState, scenario: Scenario, given
     """
     length = float(np.ptp(given.train.wheelset_x)) + 2.0 * MARGIN
     modes = round(track.modes / track.rail_length * length)
-    model = build_model(replace(given, length=length, modes=modes), V)
+    model = build_sine_model(replace(given, grading=None, length=length, modes=modes), V)
     rolling = SineState.at_rest(model)
     rear = scenario.rear + scenario.centre_in_window - model.ingredients.centre_s
     equilibrium(model, rolling, rear, V)

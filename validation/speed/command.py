@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from tiengine import result as results
-from tiengine.contact import table_cache as contact_cache
+from tiengine.parameters.cache_folders import TABLES
 from validation.speed.effort import Effort
 from validation.speed.findings import Findings
 from validation.speed.runs import CASES, Facts, median_of
@@ -52,7 +52,7 @@ def once(folder: Path, cache: Path, *settings: str) -> Facts:
     common = (f"{key}={_toml(value)}" for key, value in CASES["common"].items())
     chosen = [word for each in (*common, *settings) for word in ("--set", each)]
     words = [sys.executable, "-c", ENTRY, "run", "paper", "--quiet", "--force", "-o", str(path), *chosen]
-    environment = os.environ | {CACHE: str(cache), contact_cache.FOLDER: str(cache / "contact")}
+    environment = os.environ | {CACHE: str(cache), TABLES: str(cache / "contact")}
     clock = time.perf_counter()
     subprocess.run(words, check=True, env=environment)
     wall = time.perf_counter() - clock

@@ -1,0 +1,139 @@
+"""Ingredients of a model: parts of track and train, numerics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.contact.table import ContactTable
+from tiengine.model.newmark import Newmark
+from tiengine.track.fastening import Fastening, seat_count
+from tiengine.track.knots import Grading, graded_knots
+from tiengine.track.mortar import Mortar
+from tiengine.track.rail import Rail
+from tiengine.track.rail_operators import RailOperators
+from tiengine.track.sines import Sines
+from tiengine.track.slab import Slab
+from tiengine.track.slab_matrices import SlabMatrices
+from tiengine.track.splines import Splines
+from tiengine.vehicle.train import TrainModel, centre_in_window
+
+__all__ = ["Ingredients", "SlabDesigns"]
+
+
+@dataclass(frozen=True)
+class SlabDesigns:
+    """The different slabs of a track: sound ones, and those with voids or failed fastenings.
+
+    Attributes:
+        matrices: Matrices of each design, the sound one first.
+        seat_scale: Factors of the fastenings on each, shape (designs, seats per slab, 2).
+        of_slab: Design of the slabs (by index along the track) that are not sound.
+    """
+
+    matrices: tuple[SlabMatrices, ...]
+    seat_scale: NDArray[np.float64]
+    of_slab: Mapping[int, int]
+
+
+@dataclass(frozen=True)
+class Ingredients:
+    """Ingredients of a model: track, train and numerics.
+
+    Attributes:
+        rail: Rail section, the same left and right.
+        fastening: Sound fastening.
+        seat_factors: Factors of seats first..first+count-1, shape (count, 2).
+        slab: Slab.
+        mortar: Its bed.
+        designs: The different slabs.
+        train: Vehicles.
+        contact: Contact geometry of wheel and rail.
+        friction: Coefficient of friction.
+        cross_level_rolls: Whether a cross level turns the railheads.
+        length: Window l [m].
+        modes: Sines of a rail field, N; not used by splines.
+        newmark: Step and coefficients.
+        passes: Passes per step.
+        cover: Enough slabs for every seat of the window, or the paper's count.
+        explicit_mortar: Treat the bed explicitly.
+        grading: Knots of the splines; None for sines.
+        local_compliance: Add the static compliance that the trial functions lack under the wheels.
+        absorbing_zone: Length of the zones at the window's ends with additional springs to the ground [m]; 0 for none.
+        trains: Trains advanced together.
+    """
+
+    rail: Rail
+    fastening: Fastening
+    seat_factors: Callable[[int, int], NDArray[np.float64]]
+    slab: Slab
+    mortar: Mortar
+    designs: SlabDesigns
+    train: TrainModel
+    contact: ContactTable
+    friction: float
+    cross_level_rolls: bool
+    length: float
+    modes: int
+    newmark: Newmark
+    grading: Grading | None = None
+    passes: int = 2
+    cover: bool = True
+    explicit_mortar: bool = False
+    local_compliance: bool = False
+    absorbing_zone: float = 0.0
+    trains: int = 1
+
+    @property
+    def slots(self) -> int:
+        """Slabs in memory."""
+        return self.slab.slots(self.length, self.cover)
+
+    @property
+    def seat_reach(self) -> float:
+        """How far outside the window a seat's middle may stand and still act on the rails [m]."""
+        return 0.0 if self.grading is None else 0.5 * self.fastening.length
+
+    @property
+    def seats(self) -> int:
+        """Most seats in the window at once."""
+        return seat_count(self.length + 2.0 * self.seat_reach, self.slab.fastening_pitch)
+
+    @cached_property
+    def functions(self) -> Splines | Sines:
+        """Trial functions of the rails."""
+        if self.grading is None:
+            return Sines(self.length, self.modes)
+        return Splines(graded_knots(self.length, self.wheel_s, self.grading))
+
+    @cached_property
+    def operators(self) -> RailOperators:
+        """Matrices of a rail in the trial functions."""
+        return RailOperators(self.rail, self.functions)
+
+    @property
+    def centre_s(self) -> float:
+        """Centre of the first vehicle in the window [m]."""
+        return centre_in_window(self.length, self.train.wheelset_x)
+
+    @property
+    def wheel_s(self) -> NDArray[np.float64]:
+        """Wheels in the window [m], shape (W,)."""
+        return self.centre_s + self.train.wheelset_x
+
+    @property
+    def dof_counts(self) -> dict[str, int]:
+        """Degrees of freedom of one train: vehicles (internal states apart), rails, slabs, all."""
+        vehicles, rails = self.train.n_dof, 2 * 5 * self.functions.count
+        slabs = self.slots * self.designs.matrices[0].n
+        return {
+            "vehicles": vehicles,
+            "rails": rails,
+            "slabs": slabs,
+            "total": vehicles + rails + slabs,
+            "internal_states": self.train.n - self.train.n_dof,
+        }
