@@ -68,7 +68,7 @@ def test_steady_rolling_is_in_balance(X: float, overrides: tuple[str, ...]) -> N
 
 
 def test_forces_are_those_of_many_sines() -> None:
-    """Graded splines against 12 sines a metre, which need four passes: 0.3 % of the peak (MODEL section 1a)."""
+    """12 sines a metre, which need four passes, against the graded splines: 0.3 % of the peak (MODEL section 1a)."""
     found, steps = [], 500
     size = 2e-5 * np.random.default_rng(3).standard_normal(40)
     k = 2.0 * np.pi * np.arange(1, 41) / 20.0  # waves of 0.5 m and more

@@ -9,7 +9,6 @@ import numpy as np
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.spline_state import SplineState
 from tiengine.engine.spline_step import SplineStep, Suspension
-from tiengine.engine.state import DISPLACEMENT, VELOCITY
 from tiengine.engine.stepper import Stage, Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.spline_model import SplineModel
@@ -53,7 +52,8 @@ class SplineStepper(Stepper):
         self._window = (-1, -1)
         self._explicit_bed = int(model.dims[at.MORTAR_MODE]) > 0
         rows, dofs = chunk.body.shape[1], state.tables.slabs.dofs
-        self._bed = np.zeros((state.trains, rows, state.slots, dofs))
+        groups = -(-state.slots // 8)
+        self._bed = np.zeros((state.trains, rows, groups, dofs, 8))
         self._design = np.zeros((rows, state.slots), dtype=np.int64)
         self.bind()
 
@@ -97,8 +97,7 @@ class SplineStepper(Stepper):
         if self._explicit_bed:
             self.chunk.mortar[:, row] = state.bed.pressure
             return
-        k, c = self.model.bed_numbers[:2]
-        self._bed[:, row] = k * state.slab_motion(DISPLACEMENT) + c * state.slab_motion(VELOCITY)
+        self._bed[:, row] = state.held.bed_motion(*self.model.bed_numbers[:2])
         self._design[row] = state.held.designs[: state.slots]
 
     def finish(self, body_rows: int) -> None:
@@ -112,7 +111,8 @@ class SplineStepper(Stepper):
         kinds = self._design[:rows].ravel()
         factor, at_rest = (values.reshape(len(values), -1)[kinds] for values in (m.bed_factor, m.bed_rest))
         for bed, out in zip(self._bed[:, :rows], self.chunk.mortar[:, :rows], strict=True):
-            pressure = bed.reshape(len(kinds), -1) @ m.bed_points
+            by_slot = bed.transpose(0, 1, 3, 2).reshape(rows, -1, bed.shape[2])[:, : self.state.slots]
+            pressure = by_slot.reshape(len(kinds), -1) @ m.bed_points
             pressure *= factor
             pressure += at_rest
             out[..., 0] = pressure.max(axis=1).reshape(out.shape[:2])
