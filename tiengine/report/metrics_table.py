@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from rich.console import Group, RenderableType
 from rich.markup import escape
@@ -10,6 +10,7 @@ from rich.table import Table
 
 from tiengine.indices.index import Index
 from tiengine.indices.metrics import Metrics
+from tiengine.indices.ride import LEAST_DISTANCE
 
 __all__ = ["metrics_table", "notes"]
 
@@ -64,7 +65,18 @@ def notes(indices: Iterable[Index], metrics: Metrics) -> list[str]:
         if index.note:
             found[f"{index.standard}: {index.name}: {index.note}"] = None
     lines = [f"train {train} is left out: {why}" for train, why in metrics.failed.items()]
-    return [*found, *lines]
+    return [*found, *_left_out(metrics), *lines]
+
+
+def _left_out(metrics: Metrics) -> Iterator[str]:
+    """Name the vehicles that the run of some train is too short for."""
+    numbers = sorted({number for train in metrics.trains for number in train.left_out})
+    if numbers:
+        which = f"vehicle {numbers[0]} is" if len(numbers) == 1 else f"vehicles {numbers[0]} to {numbers[-1]} are"
+        yield (
+            f"{which} left out: the run ends before {LEAST_DISTANCE:g} m beyond the place where the run-in of the"
+            " leading one ends; set a longer train.distance"
+        )
 
 
 def _number(value: float | None) -> str:
