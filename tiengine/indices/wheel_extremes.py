@@ -113,5 +113,5 @@ def wheel_extremes(train: Train) -> WheelExtremes:
         off += ((Q <= 0.0) & ~early[..., None]).sum(axis=0)
     return WheelExtremes(
         train.model.wheelset_vehicle, largest.extreme(), smallest.extreme(-1.0), lateral.extreme(),
-        off * samples.interval,
+        np.asarray(off * samples.interval, np.float64),
     )  # fmt: skip
