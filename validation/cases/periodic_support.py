@@ -8,12 +8,12 @@ the load is added to the left rail's right-hand side in the middle of the window
 pass, then one pitch is compared: all seats within 10 m of the load together give the history of one seat.
 
 Accuracy of a sum of sines. The exact history jumps down by 3 % of its peak when the load crosses a seat
-(``floquet.jump``), since the rail's slope has a kink under a point load and the seat's damper feels V w'. A truncated
-series runs through a jump over l / 2N on either side and overshoots by 9 % of it (Gibbs) beyond, at any number of
-modes. The history is therefore compared while the load is l / 2N or more from every seat (the jump reaches the
-neighbours, too); the largest difference anywhere, which tends to half the jump, is listed for information. The
-deflection under the load is continuous and is compared over the whole pitch; it lacks the compliance of the omitted
-modes, which falls as 1/N: 8 modes per metre leave 0.6 %, hence 12 a metre for the rows that are judged.
+(``floquet.jump``), since the rail's slope has a kink under a point load and the force of the seat's damper contains V
+w'. A truncated series runs through a jump over l / 2N on either side and overshoots by 9 % of it (Gibbs) beyond, at
+any number of modes. The history is therefore compared while the load is l / 2N or more from every seat (the jump
+reaches the neighbours, too); the largest difference anywhere, which tends to half the jump, is listed for information.
+The deflection under the load is continuous and is compared over the whole pitch; it lacks the compliance of the
+omitted modes, which falls as 1/N: 8 modes per metre leave 0.6 %, hence 12 a metre for the rows that are judged.
 """
 
 from __future__ import annotations
@@ -103,10 +103,10 @@ def _prepare(model: SineModel, V: float, steps: int) -> tuple[SineState, Chunk, 
     model.vehicle_load[:] = 0.0
     state, chunk = SineState.at_rest(model), Chunk.empty(model.ingredients, steps, 1, 1)
     stepper = _Loaded(model, state, chunk)
-    felt = np.zeros_like(chunk.irregularity)
-    felt[..., at.Z_V] = 1.0
+    channels = np.zeros_like(chunk.irregularity)
+    channels[..., at.Z_V] = 1.0
     X = V * model.ingredients.newmark.dt * np.arange(1.0, steps + 1)
-    stepper.load(X, np.full(steps, V), np.zeros(steps), felt)
+    stepper.load(X, np.full(steps, V), np.zeros(steps), channels)
     chunk.clock[:, at.FIRST_SLAB] = -1000
     return state, chunk, stepper, X
 
@@ -123,7 +123,7 @@ def history(speed: int, length: float, modes: int, dt: float = 1e-4) -> History:
     """
     V, d = speed / 3.6, _seats().pitch
     model = build_sine_model(replace(_ingredients(), newmark=Newmark(dt), length=length, modes=modes), V)
-    steps, last = (int(np.ceil(way / (V * dt))) for way in (RAMP + SETTLE + d, d))
+    steps, last = (int(np.ceil(distance / (V * dt))) for distance in (RAMP + SETTLE + d, d))
     state, chunk, stepper, X = _prepare(model, V, steps)
     shape = model.window.shape(np.array([length / 2.0]))[0]
     x, force, w = [], [], []
@@ -175,8 +175,8 @@ def force_error(speed: int, length: float, modes: int, dt: float = 1e-4, apart: 
     """Largest difference over the peak [%], while the load is ``apart`` [m] (l / 2N) or more from every seat."""
     ours, pitch = history(speed, length, modes, dt), _seats().pitch
     difference = np.abs(ours.force - exact_force(speed, ours.x))
-    beside = np.abs(ours.x - pitch * np.round(ours.x / pitch))
-    chosen = difference[beside >= (length / (2.0 * modes) if apart is None else apart)]
+    from_seat = np.abs(ours.x - pitch * np.round(ours.x / pitch))
+    chosen = difference[from_seat >= (length / (2.0 * modes) if apart is None else apart)]
     return float(100.0 * chosen.max() / _peak(speed))
 
 

@@ -31,9 +31,9 @@ def _slow(kmh: float) -> float:
 def _travelled(scenario: str) -> float:
     """Share of the distance that a run has covered."""
     found = simulate(scenario)
-    way = load_scenario(scenario).train.distance
+    distance = load_scenario(scenario).train.distance
     step = found.position[1] - found.position[0]
-    return float((found.position[-1] - found.position[0] + 2.0 * step) // way)
+    return float((found.position[-1] - found.position[0] + 2.0 * step) // distance)
 
 
 def _braking_time() -> float:

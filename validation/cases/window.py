@@ -43,8 +43,8 @@ CALM = 35.0
 
 
 def _settings(length: float, step: float, *overrides: str) -> tuple[str, ...]:
-    way = ("train.start=30", "train.distance=50", f"numerics.time_step={step}", f"numerics.window={length}")
-    return (*way, f"numerics.modes_per_metre={PER_METRE!r}", *overrides)
+    course = ("train.start=30", "train.distance=50", f"numerics.time_step={step}", f"numerics.window={length}")
+    return (*course, f"numerics.modes_per_metre={PER_METRE!r}", *overrides)
 
 
 def _rail(step: float) -> FullLength:
