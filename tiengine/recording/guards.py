@@ -88,7 +88,7 @@ class Guard:
         """
         trains, wheelsets, _ = stepper.state.normal_force.shape
         guard = cls(stepper, policy, track_end, Watch.fresh(trains, wheelsets))
-        stepper.watch("guards", guard.watch_step)
+        stepper.watch("guards", guard.watch_step, due=guard.due)
         return guard
 
     def __post_init__(self) -> None:
@@ -115,10 +115,14 @@ class Guard:
 
     def watch_step(self) -> None:
         """Check at the end of a step if it is time to, and after the last of a chunk."""
+        if self.due():
+            i = self.stepper.rows.step
+            self.check(self._done + i + 1, float(self._position[i]))
+
+    def due(self) -> bool:
+        """Whether the present step is checked."""
         i = self.stepper.rows.step
-        step = self._done + i + 1
-        if step % self.every == 0 or i + 1 == len(self._position):
-            self.check(step, float(self._position[i]))
+        return (self._done + i + 1) % self.every == 0 or i + 1 == len(self._position)
 
     def check(self, step: int, position: float) -> None:
         """Check the state after a step.
