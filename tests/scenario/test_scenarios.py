@@ -203,7 +203,7 @@ def test_auto_takes_the_longest_stable_step():
 
 
 def test_a_measured_series_limits_the_step(tmp_path):
-    """Points every 0.05 m that go up and down carry waves of 0.1 m: 8 V dt is 0.156 m at 350 km/h and 2e-4 s, 0.078 m at
+    """Points every 0.05 m that go up and down have waves of 0.1 m: 8 V dt is 0.156 m at 350 km/h and 2e-4 s, 0.078 m at
     1e-4 s.
     """
     file = tmp_path / "track.csv"
