@@ -107,7 +107,7 @@ def test_outward_is_positive():
 
 
 def test_vehicles_are_kept_apart():
-    """In a train of three coaches the second's car heaves by 0.5 m/s^2 at 1 Hz, and its third wheelset loses half its load."""
+    """The second of three coaches heaves by 0.5 m/s^2 at 1 Hz, and its third wheelset loses half its load."""
     coaches = load_scenario("train3")
     model = assemble(coaches.parts.vehicles, coaches.parts.centres)
     static, time = static_wheel_loads(model), 1e-3 * np.arange(8000)
