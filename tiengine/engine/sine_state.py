@@ -99,6 +99,11 @@ class SineState(State):
         return self.force[..., 0]
 
     @property
+    def forces_on_rails(self) -> Reals:
+        """Vertical, lateral and roll force of every wheel on its rail, shape (B, W, 2, 3)."""
+        return self.rail_force
+
+    @property
     def relative_shift(self) -> Reals:
         """Outward shift of every wheel against its rail [m], shape (B, W, 2)."""
         return self.contact[..., SHIFT]

@@ -96,6 +96,11 @@ class SplineState(State):
         return self.wheels.force[..., 0]
 
     @property
+    def forces_on_rails(self) -> Reals:
+        """Vertical, lateral and roll force of every wheel on its rail, shape (B, W, 2, 3)."""
+        return self.wheels.rail_force
+
+    @property
     def relative_shift(self) -> Reals:
         """Outward shift of every wheel against its rail [m], shape (B, W, 2)."""
         return self.wheels.contact[..., SHIFT]

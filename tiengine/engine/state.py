@@ -54,6 +54,11 @@ class State(ABC):
 
     @property
     @abstractmethod
+    def forces_on_rails(self) -> Reals:
+        """Vertical [N], lateral [N] and roll force [N m] of every wheel on its rail, shape (B, W, 2, 3); a view."""
+
+    @property
+    @abstractmethod
     def relative_shift(self) -> Reals:
         """Outward shift of every wheel against its rail [m], shape (B, W, 2); a view that stays valid."""
 
