@@ -54,9 +54,9 @@ def draw(train: Train) -> Figure:
             f" shorter than a period of {BAND[0]:g} Hz; set a longer train.distance and run again"
         )
     vehicles = len(ride.vehicle_classes)
-    used = times.used(settling)
-    x = times.position[used]
-    panels = {direction: _Panel(float(x[0]), float(x[-1]), bins_for(len(x))) for direction in DIRECTIONS}
+    x = times.position[times.used(settling)]
+    limits = min(_first(ride, vehicle) for vehicle in range(vehicles)), float(x[-1])
+    panels = {direction: _Panel(*limits, bins_for(len(x))) for direction in DIRECTIONS}
     for vehicle in range(vehicles):
         _add_vehicle(panels, ride, vehicle)
     whose = f"all {vehicles} vehicles" if vehicles > 1 else "the leading vehicle"
@@ -110,6 +110,13 @@ class _Panel:
         for (name, curve), look in zip(self._curves.items(), (LEFT, RIGHT), strict=False):
             label = f"worst vehicle, {name}" if several else name
             axes.plot(*curve.line, label=label, rasterized=curve.is_thinned, **look._asdict())
+
+
+def _first(ride: RecordedRide, vehicle: int) -> float:
+    """First chainage of a vehicle that is drawn [m]; infinite if none is."""
+    times = ride.acceleration_times(vehicle)
+    position = times.position[times.used(band_pass_settling(*BAND))]
+    return float(position[0]) - ride.lag(vehicle) if len(position) else np.inf
 
 
 def _add_vehicle(panels: dict[Direction, _Panel], ride: RecordedRide, vehicle: int) -> None:
