@@ -32,7 +32,7 @@ def scenario(**overrides: Any) -> Scenario:
 
 
 def static_loads(of: Scenario) -> np.ndarray:
-    """Of each wheel [N], shape (4, 2)."""
+    """Static load of each wheel [N], shape (4, 2)."""
     return static_wheel_loads(assemble(of.parts.vehicles, of.parts.centres))
 
 

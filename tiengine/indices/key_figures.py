@@ -92,7 +92,7 @@ def _wheels(train: Train) -> Iterator[KeyFigure]:
     yield _at_wheel(found, found.largest, "largest vertical wheel force Q", np.nanargmax)
     yield _at_wheel(found, found.smallest, "smallest vertical wheel force Q", np.nanargmin, smallest=True)
     yield _at_wheel(found, found.lateral, "largest lateral wheel force |Y|", np.nanargmax)
-    w, side = map(int, np.unravel_index(int(np.argmax(found.time_off)), found.time_off.shape))
+    w, side = divmod(int(np.argmax(found.time_off)), 2)
     where = found.place(w, side) if found.time_off.any() else ""
     yield KeyFigure("longest time of a wheel off the rail", 1e3 * float(found.time_off.max()), "ms", where)
 
@@ -101,7 +101,7 @@ def _at_wheel(
     found: WheelExtremes, extreme: ForceExtreme, name: str, worst: Callable[[Reals], Any], *, smallest: bool = False
 ) -> KeyFigure:
     """Worst of all wheels [kN] and its place."""
-    w, side = map(int, np.unravel_index(int(worst(extreme.value)), extreme.value.shape))
+    w, side = divmod(int(worst(extreme.value)), 2)
     where = f"{found.place(w, side)}, chainage {extreme.chainage[w, side]:.1f} m"
     return KeyFigure(name, 1e-3 * float(extreme.value[w, side]), "kN", where, smallest)
 

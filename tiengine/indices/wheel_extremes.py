@@ -111,6 +111,7 @@ def wheel_extremes(train: Train) -> WheelExtremes:
             values[early] = -np.inf
             running.update(values, position)
         off += ((Q <= 0.0) & ~early[..., None]).sum(axis=0)
-    time_off: Reals = samples.interval * off.astype(np.float64)
-    vehicle = train.model.wheelset_vehicle
-    return WheelExtremes(vehicle, largest.extreme(), smallest.extreme(-1.0), lateral.extreme(), time_off)
+    return WheelExtremes(
+        train.model.wheelset_vehicle, largest.extreme(), smallest.extreme(-1.0), lateral.extreme(),
+        np.asarray(off * samples.interval, np.float64),
+    )  # fmt: skip

@@ -253,8 +253,7 @@ def wheelset_lag(train: TrainModel) -> NDArray[np.float64]:
     All wheelsets of a vehicle have its distance: what is evaluated by chainage begins for a vehicle this much later.
     """
     first = np.searchsorted(train.wheelset_vehicle, train.wheelset_vehicle)
-    lag: NDArray[np.float64] = train.wheelset_x[0] - train.wheelset_x[first]
-    return lag
+    return np.asarray(train.wheelset_x[0] - train.wheelset_x[first], np.float64)
 
 
 def static_wheel_loads(train: TrainModel, speed_rate: float = 0.0) -> NDArray[np.float64]:

@@ -17,8 +17,9 @@ from scipy.integrate import solve_ivp
 from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.sine_state import SineState
 from tiengine.irregularity.irregularity import make_irregularity
+from tiengine.model.from_scenario import ingredients
+from tiengine.model.sine_model import build_sine_model
 from tiengine.scenario.scenario import load_scenario
-from tiengine.simulation.simulate import prepare
 from validation.cases.semi_discrete import SemiDiscrete
 from validation.frame.case import Case
 from validation.frame.runs import simulate
@@ -40,8 +41,8 @@ STEPS = (1e-4, 5e-5, 2.5e-5)
 def _reference() -> NDArray[np.float64]:
     """Vertical and lateral wheel forces by BDF [N], shape (samples, wheelsets, 2, 2)."""
     scenario = load_scenario("paper", [*SHORT, "numerics.time_step=1e-4"])
-    model, _ = prepare(scenario)
     V = scenario.train.speed.at(0.0)[0]
+    model = build_sine_model(ingredients(scenario, STEPS[0]), V)
     state = SineState.at_rest(model)
     equilibrium(model, state, 0.0, V)
     track = make_irregularity(scenario.irregularity, float(model.ingredients.wheel_s.max()))

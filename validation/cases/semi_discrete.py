@@ -1,4 +1,4 @@
-"""The engine's semi-discrete equations as one first-order system, for general-purpose ODE solvers.
+"""The engine's semi-discrete equations with sines as one first-order system, for general-purpose ODE solvers.
 
 Written with matrices, independently of the step and its kernels: linear parts from the host's M, C, K; fastenings as
 springs and dampers between a rail's shape at the moving seat and a slab's shape; only the wheel-rail contact and the
@@ -17,7 +17,7 @@ from tiengine.engine.sine_state import SineState
 from tiengine.irregularity.irregularity import Irregularity
 from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
-from tiengine.model.model import Model
+from tiengine.model.sine_model import SineModel
 
 NUDGE = np.concatenate([np.full(5, 1e-9), np.full(5, 1e-7), np.full(18, 1e-9)])
 """Steps for the contact's derivatives: wheelset u and du/dt, then w, v, theta_x, slopes, rates of either rail."""
@@ -26,7 +26,7 @@ NUDGE = np.concatenate([np.full(5, 1e-9), np.full(5, 1e-7), np.full(18, 1e-9)])
 class SemiDiscrete:
     """M u'' + C u' + K u + fastenings(t, u, u') = gravity + suspension + contact(t, u, u'); one train, constant V."""
 
-    def __init__(self, model: Model, track: Irregularity, V: float, slabs: range) -> None:
+    def __init__(self, model: SineModel, track: Irregularity, V: float, slabs: range) -> None:
         """Assemble.
 
         Args:
@@ -122,8 +122,8 @@ class SemiDiscrete:
         return self._contact(t, u[self.dof][None], v[self.dof][None], self.under_wheels(u, v)[None])
 
     def _contact(self, t: float, *motion: NDArray[np.float64]) -> ContactForces:
-        felt = self.track.sample(self.V * t + self.model.ingredients.wheel_s)
-        return evaluate_contact(self.model, self.V, felt, *motion)
+        channels = self.track.sample(self.V * t + self.model.ingredients.wheel_s)
+        return evaluate_contact(self.model, self.V, channels, *motion)
 
     def rhs(self, t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """dy/dt."""

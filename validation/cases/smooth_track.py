@@ -13,8 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.kernels import layout as at
 from tiengine.parameters.arrays import Reals
 from tiengine.vehicle.train import static_wheel_loads
@@ -56,18 +55,18 @@ def _ripple() -> Reals:
 def _supported() -> tuple[float, float]:
     """Mean of all fastening forces, and of all wheel forces on the rails, over two slabs [N]."""
     model = paper_model(dt=DT)
-    state = SineState.at_rest(model)
+    state = state_at_rest(model)
     equilibrium(model, state, 0.0, V)
     count = 2 * STEPS // SLABS
     chunk = Chunk.empty(model.ingredients, 2 * count, 2 * count, 1)
-    stepper = SineStepper(model, state, chunk)
+    stepper = make_stepper(model, state, chunk)
     X = V * DT * np.arange(1.0, 2 * count + 1)
     stepper.load(X, np.full(2 * count, V), np.zeros(2 * count), np.zeros_like(chunk.irregularity))
     seats = []
     with threadpool_limits(1):
         for i in range(2 * count):
             stepper.step(i, i)
-            seats.append(state.seat_force[0, :, 0].sum())
+            seats.append(state.seat_forces[0, :, 0].sum())
     wheels = chunk.wheel[0, count:, ..., at.VERTICAL_FORCE].sum(axis=(1, 2))
     return float(np.mean(seats[count:])), float(wheels.mean())
 
