@@ -55,7 +55,7 @@ def add_point(j: int, k: int, t: float, weight: float, curvature: float, place: 
 @ti.func
 def seat_shapes(
     s0: float, first_seat: int, first_slab: int, slots: int, V: float, size: Array, dims: Array, constants: Array,
-    point: Array, span: Array, place: Array, shape_out: Array,
+    point: Array, span: Array, place_out: Array, shape_out: Array,
 ):  # fmt: skip
     """Functions that each seat touches, its numbers for them, and its place on the slabs.
 
@@ -70,7 +70,7 @@ def seat_shapes(
         constants: Numbers, see ``layout``.
         point: Offset [m] and weight of the Gauss points, ascending, shape (points, 2).
         span: Ends, polynomials and first function of the spans, shape (spans, N_SPAN).
-        place: Functions touched and place on the slabs, shape (seats, N_SEAT_PLACE); filled.
+        place_out: Functions touched and place on the slabs, shape (seats, N_SEAT_PLACE); filled.
         shape_out: Numbers of each seat and function, shape (seats TOUCHED N_SEAT_SHAPE,); filled.
     """
     length = constants[layout.LENGTH]
@@ -87,30 +87,30 @@ def seat_shapes(
         if rear <= front:
             reached = span_from(reached, rear, span)  # seats ascend
             k, last = reached, span_from(reached, front, span)
-            place[j, at.TOUCH_FIRST] = first_function(k, span)
+            place_out[j, at.TOUCH_FIRST] = first_function(k, span)
             count = first_function(last, span) + 4 - first_function(k, span)
             for m in range(count * at.N_SEAT_SHAPE):
                 shape_out[j * at.TOUCHED * at.N_SEAT_SHAPE + m] = 0.0
             if k == last and s + point[0, 0] >= 0.0 and s + point[points - 1, 0] <= length:
-                add_point(j, k, s - span[k, at.SPAN_REAR], 1.0, spread, place, span, shape_out)
+                add_point(j, k, s - span[k, at.SPAN_REAR], 1.0, spread, place_out, span, shape_out)
             else:
                 for g in range(points):
                     x = s + point[g, 0]
                     if x >= 0.0 and x <= length:
                         while k < last and x > span[k, at.SPAN_FRONT]:
                             k += 1
-                        add_point(j, k, x - span[k, at.SPAN_REAR], point[g, 1], 0.0, place, span, shape_out)
+                        add_point(j, k, x - span[k, at.SPAN_REAR], point[g, 1], 0.0, place_out, span, shape_out)
             for q in range(count):
                 m = (j * at.TOUCHED + q) * at.N_SEAT_SHAPE
                 N, D = shape_out[m], -V * shape_out[m + 1]
                 shape_out[m + at.PULL_U], shape_out[m + at.PULL_V] = kv * N + cv * D, cv * N
                 shape_out[m + at.SIDE_U], shape_out[m + at.SIDE_V] = kl * N + cl * D, cl * N
-        place[j, at.TOUCH_COUNT] = count
+        place_out[j, at.TOUCH_COUNT] = count
         slab = (first_seat + j) // per_slab
         slot = slab % slots
-        place[j, at.SEAT_GROUP], place[j, at.SEAT_SLOT] = slot // 8, slot % 8
-        place[j, at.SEAT_ROW] = (first_seat + j) % per_slab
-        place[j, at.MODELLED] = ti.cast(count > 0 and slab >= first_slab and slab < first_slab + slots, ti.i32)
+        place_out[j, at.SEAT_GROUP], place_out[j, at.SEAT_SLOT] = slot // 8, slot % 8
+        place_out[j, at.SEAT_ROW] = (first_seat + j) % per_slab
+        place_out[j, at.MODELLED] = ti.cast(count > 0 and slab >= first_slab and slab < first_slab + slots, ti.i32)
 
 
 @ti.func

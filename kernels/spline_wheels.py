@@ -144,8 +144,8 @@ def contact_of_train(
     b: int, c: int, lane: int, step: int, V: float, tolerance: float, record: int, dims: Array, constants: Array,
     place: Array, wheelset_place: Array, car_columns_start: Array, columns: Array, wheel: Array, table: Array,
     irregularity: Array, wheelset_compliance: Array, coupling: Array, contact: Array, force: Array,
-    wheelset_force: Array, rail_force: Array, iterations: Array, wheel_record: Array, car: Array, under: Array,
-    cars: int, blocks: Template,
+    wheelset_force: Array, rail_force: Array, iterations_out: Array, wheel_record_out: Array, car: Array,
+    under: Array, cars: int, blocks: Template,
 ):  # fmt: skip
     """Solve the contact of all wheelsets of a train, one after another, and leave the rails' loads in ``under``.
 
@@ -169,9 +169,9 @@ def contact_of_train(
         add_wheelset_change(
             b, w, start, before, wheelset_place, wheelset_force, car_columns_start, columns, car, blocks
         )
-        iterations[b, w] = ti.max(iterations[b, w], count)
+        iterations_out[b, w] = ti.max(iterations_out[b, w], count)
         if record >= 0:
-            ct.record_wheels(b, w, record, contact, force, rail_force, wheel_record)
+            ct.record_wheels(b, w, record, contact, force, rail_force, wheel_record_out)
     for w in range(dims[layout.WHEELSETS]):
         p = (c * dims[layout.WHEELSETS] + w) * N_UNDER + LOAD
         for side in ti.static(range(2)):

@@ -79,11 +79,11 @@ def add_number(car: Array, place: int, x: float):
 
 
 @ti.func
-def record_bodies(b: int, row: int, start: int, place: Array, car: Array, body_record: Array, blocks: Template):
+def record_bodies(b: int, row: int, start: int, place: Array, car: Array, body_record_out: Array, blocks: Template):
     """Motion of a train's bodies: rows U, V, A. ``start`` is the train's first number, ``place`` by coordinate."""
     for kind in range(3):
-        for i in range(body_record.shape[3]):
-            body_record[b, row, kind, i] = number(car, start + kind * blocks * 8 + place[i])
+        for i in range(body_record_out.shape[3]):
+            body_record_out[b, row, kind, i] = number(car, start + kind * blocks * 8 + place[i])
 
 
 @ti.func

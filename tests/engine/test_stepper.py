@@ -34,6 +34,7 @@ class OtherState(State):
         self.iterations = np.ones((B, 4), dtype=np.int32)
         self.load = np.full(wheels, 7e4)
         self.shift = np.zeros(wheels)
+        self.on_rail = np.zeros((4, 2, 3, B))
         self.seats = np.zeros((self.ingredients.seats, 3, 2, B))
         self.sunk = np.zeros((3, self.slots, dofs, B))
         self.cleared: list[int] = []
@@ -41,6 +42,7 @@ class OtherState(State):
     trains = property(lambda self: B)
     slots = property(lambda self: self.ingredients.slots)
     normal_force = property(lambda self: self.load.transpose(2, 0, 1))
+    forces_on_rails = property(lambda self: self.on_rail.transpose(3, 0, 1, 2))
     relative_shift = property(lambda self: self.shift.transpose(2, 0, 1))
     seat_forces = property(lambda self: self.seats.transpose(3, 2, 1, 0))
 

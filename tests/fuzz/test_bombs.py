@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -88,7 +89,7 @@ def test_long_lines(name: str, tmp_path: Path) -> None:
     path.write_text("x,z_v\n" + "1," * 4_500_000)
     message = refused(lambda: read(path))
     assert message is not None
-    assert "line 2: 9000000 characters; at most 10000 expected" in message
+    assert re.search(r"line 2: 9000000 characters; (must be )?at most 10000", message)
 
 
 def test_many_points(tmp_path: Path) -> None:
@@ -141,7 +142,7 @@ def test_nested_toml(text: str) -> None:
             },
             "3000 functions",
         ),
-        ({"train": {**TRAIN, "speed_kmh": 1e-12}}, "would take up to 7.2e+13 s; must be at most 1e+06 s"),
+        ({"train": {**TRAIN, "speed_kmh": 1e-12}}, "take up to 7.2e+13 s; must be at most 1e+06 s"),
         (
             {"gauges": tuple({"name": f"g{i}", "on": "rail", "chainage": 1.0, "side": "left"} for i in range(1001))},
             "gauges",

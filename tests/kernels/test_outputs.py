@@ -16,6 +16,15 @@ STATE = {
     "force": "local contact forces of the wheels, where the next solve starts",
     "wheelset_force": "contact forces on the wheelsets",
     "rail_force": "contact forces on the rails",
+    "rail": "spline coefficients of the rails, their forces and sweeps",
+    "seat": "forces of the seats in the rails' lanes",
+    "slab": "coordinates of the slabs, their loads and sweeps",
+    "slab_seat": "slabs at their seats: motion, then loads",
+    "car": "coordinates of the vehicles and their loads",
+    "under": "rails under the wheels, and what the wheels do to them",
+    "near": "registers: the rows of a sweep that the next one needs",
+    "row": "registers: the row of a sweep that is solved",
+    "total": "registers: a sum of columns",
 }
 """State that kernels read and store into."""
 

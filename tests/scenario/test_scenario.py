@@ -294,18 +294,18 @@ def test_wavelength_limit_is_eight_steps():
     scenario = load_scenario("paper")
     limit = 1.0 / (8.0 * 350.0 / 3.6)
     check_wavelength(scenario, limit * (1 - 1e-9))
-    with pytest.raises(InputError, match=r"irregularity.wavelength_min = 1: must be at least 8 V dt"):
+    with pytest.raises(InputError, match=r"irregularity.wavelength_min = 1 m: must be at least 8 V dt"):
         check_wavelength(scenario, limit * (1 + 1e-9))
     check_wavelength(load_scenario("smooth"), limit * 2)
     assert "8 V dt = 0.07778 m" in refusal("paper", ["irregularity.wavelength_min=0.07", "numerics.time_step=1e-4"])
 
 
 def test_train_of_three():
-    """Couplings at the vehicles' length by default; wheels span 2 x 25 + 20 m, the window 8 m more."""
+    """Couplings at the vehicles' length by default; wheels span 2 x 25 + 20 m, the window 8 m more at either end."""
     scenario = load_scenario("train3")
     np.testing.assert_array_equal(scenario.parts.centres, [0.0, -25.0, -50.0])
     assert scenario.parts.wheel_span == 70.0
-    assert scenario.window_length == 78.0
+    assert scenario.window_length == 86.0
     assert (np.diff(scenario.parts.wheelset_positions) < 0.0).all()
     wide = load_scenario("train3", ["train.coupler_pitch=[26.0, 30.0]"])
     np.testing.assert_array_equal(wide.parts.centres, [0.0, -26.0, -56.0])

@@ -209,7 +209,7 @@ def test_a_complete_file_keeps_no_checkpoints(tmp_path):
 
 def test_a_reader_does_not_wait_for_a_writer_for_ever(tmp_path, monkeypatch):
     """A journal lies there and somebody holds the lock: the file as it is."""
-    monkeypatch.setattr("tiengine.file_lock.PATIENCE", 0.05)
+    monkeypatch.setattr("tiengine.result_files.file_lock.PATIENCE", 0.05)
     path = tmp_path / "run.h5"
     left_unfinished(path)
     atomic_write(journal_of(path), journal._journal(path.stat().st_size, []))

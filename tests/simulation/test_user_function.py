@@ -22,7 +22,8 @@ SHORT = {
     "numerics.truncation": "none",
     "numerics.time_step": 2e-4,
     "output.precision": "double",
-    "irregularity.taper": 1e-3,
+    "irregularity.taper": 1e-3,  # the hill begins with a step of 1 mm:
+    "events.oscillation": "record",  # its blow lets the forces of the finest knots ring on at the step's frequency
 }
 
 
