@@ -80,7 +80,7 @@ def test_forces_are_those_of_many_sines() -> None:
         felt = np.zeros((1, steps, 4, at.N_IRREGULARITY))
         felt[0, ..., at.Z_V] = ramp[:, None] * (np.sin(phase) @ size)
         felt[0, ..., at.Z_V_SLOPE] = ramp[:, None] * (np.cos(phase) @ (k * size))
-        found.append(run.march(steps, felt)[..., at.NORMAL_FORCE])
+        found.append(run.advance(steps, felt)[..., at.NORMAL_FORCE])
     splines, sines = found
     difference = np.abs(splines - sines)
     assert np.percentile(difference, 99) < 0.003 * sines.max()
@@ -152,18 +152,22 @@ def test_tables_follow_the_speed() -> None:
 
 
 def test_extremes_are_those_of_every_step() -> None:
-    """What the launch keeps between two moves of the window, against the forces after each step."""
+    """Extremes kept by the launch between two moves of the window equal those of the forces after each step."""
     stepper = stepper_of(default_model(trains=2), 150, 30.0)
     envelopes = SeatEnvelopes.of(stepper)
     stepper.watch("envelopes", envelopes.watch)
     load(stepper, 30.0 + V350 * 2e-4 * np.arange(1, 151), rough=1e-5)
     seen: dict[int, list[NDArray[np.float64]]] = {}
     first, end = watched_seats(stepper.ingredients)
-    for i in range(150):
-        stepper.step(i)
+
+    def look() -> None:
         forces = stepper.state.seat_forces
         for place in range(first, end):
             seen.setdefault(stepper.state.first_seat + place, []).append(forces[..., place])
+
+    stepper.watch("look", look)
+    for i in range(150):
+        stepper.step(i)
     moved = envelopes.blocks(np.zeros(0), np.zeros(0))
     kept = envelopes.remainder()
     for b in range(2):
@@ -176,6 +180,27 @@ def test_extremes_are_those_of_every_step() -> None:
             values = np.concatenate([moved[b].channels[name], kept[b].channels[name]])
             for seat, value in zip(seats, values, strict=True):
                 np.testing.assert_array_equal(value, reduce(seen[int(seat)], axis=0)[b, :, row])
+
+
+def test_steps_may_be_put_off() -> None:
+    """Several steps in a launch between two that something reads: same bits, and the reader sees its own step."""
+    found = []
+    for every in (1, 5):
+        stepper = stepper_of(default_model(), 100, 5.6)
+        force: list[NDArray[np.float64]] = []
+
+        def look(stepper: SplineStepper = stepper, force: list[NDArray[np.float64]] = force) -> None:
+            if (stepper.rows.step + 1) % 5 == 0:
+                force.append(stepper.state.normal_force.copy())
+
+        stepper.watch("look", look, due=lambda stepper=stepper, every=every: (stepper.rows.step + 1) % every == 0)
+        load(stepper, 5.6 + V350 * 2e-4 * np.arange(1, 101), rough=1e-5)
+        for i in range(100):
+            stepper.step(i, i, i // 10 if i % 10 == 9 else -1)
+        found.append((np.array(force), stepper.chunk.wheel[:, :100], stepper.chunk.body[:, :10]))
+    for one, many in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, many)
+    assert np.ptp(found[0][0][:, 0, 0, 0]) > 100.0
 
 
 @pytest.mark.parametrize("no_tension", [False, True])

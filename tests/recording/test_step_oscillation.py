@@ -66,7 +66,7 @@ def test_seats_that_modulate_an_oscillation_do_not_hide_it():
 
 def test_a_saturated_oscillation_is_found():
     """Friction bounds it: it no longer grows."""
-    assert found(2e4 * (-1.0) ** np.arange(2000)) == pytest.approx(0.11, abs=0.011)
+    assert found(2e4 * (-1.0) ** np.arange(2000)) == pytest.approx(0.11, abs=0.021)
 
 
 def test_real_forces_are_left_alone():
@@ -87,6 +87,6 @@ def test_white_noise_below_one_per_cent_is_left_alone():
     assert found(0.005 * LOAD * random.standard_normal(8000)) is None
 
 
-@pytest.mark.parametrize(("dt", "interval"), [(1e-3, 10), (2e-4, 50), (2.5e-5, 400), (1.5e-3, 8)])
-def test_looks_are_ten_milliseconds_apart(dt, interval):
+@pytest.mark.parametrize(("dt", "interval"), [(1e-3, 20), (2e-4, 100), (2.5e-5, 800), (5e-3, 8)])
+def test_looks_are_twenty_milliseconds_apart(dt, interval):
     assert StepOscillation.interval(dt) == interval

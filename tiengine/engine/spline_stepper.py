@@ -50,6 +50,7 @@ class SplineStepper(Stepper):
         self._compiled = self.launch.launch.compile_seconds
         self.factored_speed = float("nan")
         self._window = (-1, -1)
+        self._pending = 0
         self._explicit_bed = int(model.dims[at.MORTAR_MODE]) > 0
         rows, dofs = chunk.body.shape[1], state.tables.slabs.dofs
         groups = -(-state.slots // 8)
@@ -61,7 +62,7 @@ class SplineStepper(Stepper):
     def seat_extremes_due(self) -> bool:
         """Whether the seats move on before the next step, or the chunk ends: the launch keeps extremes until then."""
         coming = self.rows.step + 1
-        return coming >= len(self.moves) or bool(self.moves[coming])
+        return coming >= len(self.moves) or self._changes(coming) != (False, False)
 
     def _stages(self) -> Iterator[Stage]:
         """Stages of the step in their order; :mod:`tiengine.kernels.spline_step` gives the equations."""
@@ -71,22 +72,31 @@ class SplineStepper(Stepper):
 
     def _enter(self) -> None:
         """Let seats and slabs in and out where they change; factorise again when the speed has changed enough."""
-        i = self.rows.step
+        window, speed = self._changes(self.rows.step)
+        clock = self.chunk.clock[self.rows.step]
+        if window:
+            self._window = int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])
+            self.state.enter(*self._window)
+        if speed:
+            self.factor(float(clock[at.SPEED]))
+
+    def _changes(self, i: int) -> tuple[bool, bool]:
+        """Whether seats or slabs move on, and whether tables are to be made for another speed, before step ``i``."""
         if not self.moves[i]:
-            return
-        clock = self.chunk.clock[i]
-        window, V = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])), float(clock[at.SPEED])
-        if window != self._window:
-            self._window = window
-            self.state.enter(*window)
-        factored = self.factored_speed
-        if V != factored and not abs(V - factored) < REFACTOR * factored:
-            self.factor(V)
+            return False, False
+        clock, factored = self.chunk.clock[i], self.factored_speed
+        V = float(clock[at.SPEED])
+        window = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])) != self._window
+        return window, V != factored and not abs(V - factored) < REFACTOR * factored
 
     def _advance(self) -> None:
+        """Take this step, with those put off before it, unless nothing reads the state after it."""
         i, wheel_row, body_row = self.rows
         self.launch.record[i] = wheel_row, body_row
-        self.launch(i)
+        self._pending += 1
+        if body_row >= 0 or self.watched or self.seat_extremes_due:
+            self.launch(i + 1 - self._pending, self._pending)
+            self._pending = 0
 
     def _record_bed(self) -> None:
         """Keep the bed's motion, or its pressures, if this step records the bodies."""

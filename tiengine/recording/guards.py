@@ -98,7 +98,7 @@ class Guard:
         """
         trains, wheelsets, _ = stepper.state.normal_force.shape
         guard = cls(stepper, policy, track_end, Watch.fresh(trains, wheelsets))
-        stepper.watch("guards", guard.watch_step)
+        stepper.watch("guards", guard.watch_step, due=guard.due)
         return guard
 
     def __post_init__(self) -> None:
@@ -132,8 +132,16 @@ class Guard:
         step = self._done + i + 1
         if self.watch.oscillation.sample(step, self._look_every, self._vertical_lateral):
             self._oscillates(step, step * self._dt, float(self._position[i]))
-        if step % self.every == 0 or i + 1 == len(self._position):
+        if self._check_due(i):
             self.check(step, float(self._position[i]))
+
+    def due(self) -> bool:
+        """Whether the present step is checked, or its forces are looked at."""
+        i = self.stepper.rows.step
+        return self._check_due(i) or self.watch.oscillation.due(self._done + i + 1, self._look_every)
+
+    def _check_due(self, i: int) -> bool:
+        return (self._done + i + 1) % self.every == 0 or i + 1 == len(self._position)
 
     def check(self, step: int, position: float) -> None:
         """Check the state after a step.

@@ -2,7 +2,7 @@
 
 A step that is unstable by a little lets the forces alternate from one step to the next, growing for thousands of steps
 before anything runs away. Real motion does not look so: the irregularity must be resolved by eight steps a wave, and
-the waves of an impact die out. So a few successive steps are looked at once in 10 ms: of an alternating force the sum
+the waves of an impact die out. So a few successive steps are looked at once in 20 ms: of an alternating force the sum
 of squared second differences is four times that of first differences, of a sine with eight steps a period 0.6 times.
 """
 
@@ -20,7 +20,7 @@ __all__ = ["StepOscillation"]
 WINDOW = 8
 """Successive steps that are looked at."""
 
-EVERY = 1e-2
+EVERY = 2e-2
 """Simulated time from one look to the next [s], at least a window."""
 
 ALTERNATING = 3.0
@@ -65,17 +65,22 @@ class StepOscillation:
         """Steps of dt [s] from one look to the next."""
         return max(round(EVERY / dt), WINDOW)
 
+    @staticmethod
+    def due(step: int, interval: int) -> bool:
+        """Whether a step, numbered from 1, belongs to a window."""
+        return (step - 1) % interval < WINDOW
+
     def sample(self, step: int, interval: int, force: Reals) -> bool:
-        """Keep the forces if this step belongs to a window; whether it is the last of one.
+        """Keep the forces if a step belongs to a window; whether it is the last of one.
 
         Args:
             step: Its number, from 1.
             interval: See :meth:`interval`.
             force: Vertical and lateral forces of the wheels [N], shape (B, W, 2, 2).
         """
-        place = (step - 1) % interval
-        if place >= WINDOW:
+        if not self.due(step, interval):
             return False
+        place = (step - 1) % interval
         self.samples[place] = force
         return place == WINDOW - 1
 

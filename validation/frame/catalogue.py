@@ -22,6 +22,7 @@ from validation.cases import (
     supported_beam,
     thin_plates,
     time_stepping,
+    uplift,
     vehicles,
     wheel_spectrum,
     window,
@@ -57,6 +58,7 @@ _FILES = (
     time_stepping,
     convergence,
     bdf,
+    uplift,
     robustness,
     paper_case,
     comparison,
@@ -68,8 +70,8 @@ CASES: tuple[Case, ...] = tuple(case for file in _FILES for case in file.CASES)
 
 HEADLINES = (
     "plate-aspect-1.5",
-    "floquet-seat-350",
-    "floquet-deflection-350",
+    "floquet-default-seat-350",
+    "floquet-default-deflection-350",
     "pinned-pinned",
     "supported-beam-mass",
     "klingel-free-20",
