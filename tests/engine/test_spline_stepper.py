@@ -152,7 +152,7 @@ def test_tables_follow_the_speed() -> None:
 
 
 def test_extremes_are_those_of_every_step() -> None:
-    """What the launch keeps between two moves of the window, against the forces after each step."""
+    """Extremes kept by the launch between two moves of the window equal those of the forces after each step."""
     stepper = stepper_of(default_model(trains=2), 150, 30.0)
     envelopes = SeatEnvelopes.of(stepper)
     stepper.watch("envelopes", envelopes.watch)

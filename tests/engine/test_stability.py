@@ -40,7 +40,7 @@ def test_growth_counts_over_the_run():
 
 
 def test_nothing_grows_by_the_default_step():
-    """Of the track alone, and of rolling trains: seats damp."""
+    """Disturbances of the track alone and of rolling trains decay: seats damp."""
     growth = step_growth(default_model(), V350, 7700)
     assert growth.rate < 0.0
 

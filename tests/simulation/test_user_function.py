@@ -37,7 +37,7 @@ def hill(x, height=1e-3):
 
 
 def slopes(x):
-    """Of the hill."""
+    """Slope of the hill."""
     return -1e-4 * np.pi * np.sin(0.1 * np.pi * x), 0.0, 0.0, 0.0
 
 

@@ -1,4 +1,4 @@
-"""What a spline step changes: the arrays of vectors, and the way from them to plain numbers."""
+"""State of a spline step: arrays of vectors, and their conversion to plain numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NOTHING_SEEN = 1e300
 
 @dataclass(frozen=True, eq=False)
 class SplineArrays:
-    """What a step changes, and the way to its numbers; B trains in chunks of lanes / 2.
+    """State of a spline step and access to its numbers; B trains in chunks of lanes / 2.
 
     Attributes:
         trains: B.

@@ -130,9 +130,16 @@ class Samples:
             filtered = {name: low_pass(values, self.interval, cut_off)[kept] for name, values in channels.items()}
             yield end - start, position[kept], filtered
 
-    def read(self, start: int, end: int) -> tuple[Reals, dict[str, Reals]]:
-        """Read positions [m] and channels of the samples from ``start`` up to ``end``, in double precision."""
-        channels = {name: self.group[name][start:end].astype(np.float64) for name in self._channels}
+    def read(self, start: int, end: int, columns: slice | None = None) -> tuple[Reals, dict[str, Reals]]:
+        """Read positions [m] and channels of the samples from ``start`` up to ``end``, in double precision.
+
+        Args:
+            start: First sample.
+            end: Sample after the last one.
+            columns: Wheelsets or bodies to be read; all if None.
+        """
+        part = (slice(start, end),) if columns is None else (slice(start, end), columns)
+        channels = {name: self.group[name][part].astype(np.float64) for name in self._channels}
         return np.asarray(self.group["position"][start:end]), channels
 
 
