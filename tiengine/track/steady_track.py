@@ -104,8 +104,9 @@ class SteadyTrack:
         Returns:
             w, v, theta_x, their slopes, their (zero) rates at constant s, shape (B, W, 2, 9).
         """
-        under: Reals = np.einsum("wrfuqc,buqc->bwrf", self._compliance, force)
-        return under
+        shape = self._compliance.shape[:3]
+        under: Reals = force.reshape(len(force), -1) @ self._compliance.reshape(np.prod(shape), -1).T
+        return under.reshape(len(force), *shape)
 
     def motion(self, force: Reals) -> tuple[Reals, Reals, Reals]:
         """Generalised coordinates under wheel forces.
