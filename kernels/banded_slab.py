@@ -40,7 +40,7 @@ def pull_at_seats(
     slab: Array, base: int, dofs: int, out: int, per_slab: int, index: Array, shape: Array, seat_x: Array,
     slab_seat: Array,
 ):  # fmt: skip
-    """What a group's motion takes off its seats: five rows a seat (``spline_layout``), moments per b^2.
+    """Subtract a group's motion at its seats: five rows per seat (``spline_layout``), moments per b^2.
 
     Args:
         slab: State of the slabs.
@@ -97,7 +97,7 @@ def shift(near: Template, newest: Template, K: Template):
 
 @ti.func
 def coupled(coefficient: Array, k: int, near: Template, K: Template):
-    """What a row couples with: the farthest first, the nearest last."""
+    """Entries that a row couples with: the farthest first, the nearest last."""
     total = coefficient[k + K - 1] * near[K - 1]
     for q in ti.static(range(1, K)):
         total = total + coefficient[k + K - 1 - q] * near[K - 1 - q]

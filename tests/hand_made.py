@@ -19,7 +19,7 @@ from tiengine.vehicle.train import assemble, static_wheel_loads
 V = 350.0 / 3.6  # m/s
 BODIES = ("car", "frame 1", "frame 2", "wheelset 1", "wheelset 2", "wheelset 3", "wheelset 4")
 OFFSET = np.array([10.0, 7.5, -7.5, -10.0])  # m, wheelsets of CRH380A_v2
-START = 14.0  # m: where the default scenario's first vehicle stands at t = 0
+START = 18.0  # m: where the default scenario's first vehicle stands at t = 0
 SLAB, SEAT = 5.67, 0.63  # m, of CRTS_III
 
 Groups = Mapping[str, Mapping[str, Any]]
@@ -32,7 +32,7 @@ def scenario(**overrides: Any) -> Scenario:
 
 
 def static_loads(of: Scenario) -> np.ndarray:
-    """Of each wheel [N], shape (4, 2)."""
+    """Static load of each wheel [N], shape (4, 2)."""
     return static_wheel_loads(assemble(of.parts.vehicles, of.parts.centres))
 
 

@@ -16,6 +16,7 @@ from tiengine.kernels import layout as at
 from tiengine.model.from_scenario import ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
+from tiengine.model.spline_model import SplineModel, build_spline_model
 from tiengine.scenario.scenario import load_scenario
 
 V350 = 350.0 / 3.6
@@ -23,8 +24,8 @@ V350 = 350.0 / 3.6
 
 
 @cache
-def _base(overrides: tuple[str, ...]) -> Ingredients:
-    return ingredients(load_scenario("paper", overrides), 1e-4)
+def _base(overrides: tuple[str, ...], name: str = "paper") -> Ingredients:
+    return ingredients(load_scenario(name, overrides), 1e-4)
 
 
 def paper_model(*overrides: str, V: float = V350, dt: float = 1e-4, **changes: Any) -> Model:
@@ -37,6 +38,11 @@ def paper_model(*overrides: str, V: float = V350, dt: float = 1e-4, **changes: A
         changes: Fields of ``Ingredients`` that replace the scenario's.
     """
     return build_model(replace(_base(overrides), newmark=Newmark(dt), **changes), V)
+
+
+def default_model(*overrides: str, V: float = V350, dt: float = 2e-4, **changes: Any) -> SplineModel:
+    """Model of the scenario ``default``, whose rails are splines; arguments as for :func:`paper_model`."""
+    return build_spline_model(replace(_base(overrides, "default"), newmark=Newmark(dt), **changes), V)
 
 
 class Run:

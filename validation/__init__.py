@@ -1,1 +1,1 @@
-"""What the engine is held to: closed forms, others' numbers, convergence; ``python -m validation``."""
+"""Verification and validation: closed forms, published numbers, convergence; ``python -m validation``."""

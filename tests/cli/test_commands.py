@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-import tiengine
 from tiengine import result as results
+from tiengine import simulation
 from tiengine.cli.commands import main
 from tiengine.parameters.errors import RunStoppedError
 from tiengine.parameters.presets import KINDS, preset_names
@@ -60,7 +60,7 @@ def fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
 
     module.run = run
     monkeypatch.setitem(sys.modules, "tiengine.simulation.simulate", module)
-    monkeypatch.setattr(tiengine, "simulate", module, raising=False)
+    monkeypatch.setattr(simulation, "simulate", module, raising=False)  # where an earlier import has put the real one
     monkeypatch.chdir(tmp_path)
     return module
 

@@ -92,7 +92,7 @@ def test_reading_imports_no_taichi(folder, code):
 
 @pytest.mark.parametrize("command", ["list", "info run.h5", "export short.h5 -o again.csv"])
 def test_light_commands_import_little(folder, command):
-    """What takes long to import is left to the commands that need it."""
+    """Slow imports are left to the commands that need them."""
     assert not {"matplotlib", "jinja2", "scipy", "pydantic"} & loaded(COMMAND, *command.split(), folder=folder)
 
 

@@ -66,6 +66,16 @@ class OtherState(State):
             return self.sunk[..., train]
         return np.zeros((3, 5) if name == "vehicles" else (3, 2, 5))
 
+    def put(self, kind: int, name: str, values: NDArray[np.float64]) -> None:
+        if name == "slabs":
+            self.sunk[kind] = np.moveaxis(np.broadcast_to(values, (B, *self.sunk.shape[1:3])), 0, -1)
+
+    def put_contact(self, contact: object, local: NDArray[np.float64], wheelset: object, rail: object) -> None:
+        self.load[:] = np.moveaxis(np.broadcast_to(local[..., 0], (B, 4, 2)), 0, -1)
+
+    def enter(self, first_seat: int, first_slab: int) -> None:
+        self.first_seat, self.first_slab = first_seat, first_slab
+
     def clear(self, train: int) -> None:
         self.cleared.append(train)
         self.sunk[..., train] = 0.0

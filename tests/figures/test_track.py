@@ -37,14 +37,14 @@ def titles(figure):
 
 
 def test_where_the_train_has_been(tmp_path):
-    """By hand: wheels came to 4.0 to 218.3 m, all of them to 24.0 to 198.3 m; seats stand at (j + 1/2) 0.63 m."""
+    """By hand: wheels came to 8.0 to 222.3 m, all of them to 28.0 to 202.3 m; seats stand at (j + 1/2) 0.63 m."""
     with track(tmp_path / "a.h5", by.seats(400), by.slabs(45)) as result:
         seats = read_extremes(Train(result), "seats", "output.envelopes")
     chainage = (np.arange(400) + 0.5) * 0.63
     end = by.START + by.V * 1.999
-    np.testing.assert_array_equal(seats.reached, (chainage >= 4.0) & (chainage <= end + 10.0))
-    np.testing.assert_array_equal(seats.passed, (chainage >= 24.0) & (chainage <= end - 10.0))
-    assert seats.partly_passed[0] == pytest.approx((6 * 0.63, 38 * 0.63))  # seats 6 to 37, half a pitch more
+    np.testing.assert_array_equal(seats.reached, (chainage >= 8.0) & (chainage <= end + 10.0))
+    np.testing.assert_array_equal(seats.passed, (chainage >= 28.0) & (chainage <= end - 10.0))
+    assert seats.partly_passed[0] == pytest.approx((13 * 0.63, 44 * 0.63))  # seats 13 to 43, half a pitch more
     assert seats.defects == []
 
 
@@ -134,7 +134,7 @@ def test_waterfall_shows_the_snapshots(tmp_path):
         assert pictures[side].norm is pictures[0].norm
     assert np.ma.masked_invalid(pictures[2].get_array()).mask.sum() == 6
     edges = pictures[0].get_coordinates()[:, 0, 1]
-    np.testing.assert_allclose(edges, [14.0, 16.5, 21.5, 26.5, 31.5, 36.5, 39.0])
+    np.testing.assert_allclose(edges, [18.0, 20.5, 25.5, 30.5, 35.5, 40.5, 43.0])
 
 
 def test_long_waterfalls_keep_the_largest(tmp_path):

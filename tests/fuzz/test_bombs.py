@@ -134,7 +134,13 @@ def test_nested_toml(text: str) -> None:
             "90090 different trains: must be at most 5000",
         ),
         ({"train": {**TRAIN, "vehicles": ("CRH380A_v2",) * 1000}}, "must have at most 64 items"),
-        ({"train": {**TRAIN, "vehicles": ("CRH380A_v2",) * 64}, "numerics": {"modes_per_metre": 20.0}}, "3000 modes"),
+        (
+            {
+                "train": {**TRAIN, "vehicles": ("CRH380A_v2",) * 64},
+                "numerics": {"trial_functions": "sines", "modes_per_metre": 20.0},
+            },
+            "3000 functions",
+        ),
         ({"train": {**TRAIN, "speed_kmh": 1e-12}}, "would take up to 7.2e+13 s; must be at most 1e+06 s"),
         (
             {"gauges": tuple({"name": f"g{i}", "on": "rail", "chainage": 1.0, "side": "left"} for i in range(1001))},

@@ -39,7 +39,7 @@ def scenario(trains: int = 1) -> Scenario:
 
 @cache
 def static_loads() -> np.ndarray:
-    """Of each wheel [N]."""
+    """Static load of each wheel [N]."""
     parts = scenario().parts
     return static_wheel_loads(assemble(parts.vehicles, parts.centres))
 
@@ -107,7 +107,7 @@ def test_outward_is_positive():
 
 
 def test_vehicles_are_kept_apart():
-    """Of three coaches the second's car heaves by 0.5 m/s^2 at 1 Hz, and its third wheelset loses half its load."""
+    """The second of three coaches heaves by 0.5 m/s^2 at 1 Hz, and its third wheelset loses half its load."""
     coaches = load_scenario("train3")
     model = assemble(coaches.parts.vehicles, coaches.parts.centres)
     static, time = static_wheel_loads(model), 1e-3 * np.arange(8000)

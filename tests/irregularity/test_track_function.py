@@ -81,7 +81,7 @@ def test_a_function_that_cannot_be_imported_is_named(monkeypatch):
 
 
 def test_names():
-    """Of a function, a partial one, an object that can be called."""
+    """Names of a function, a partial one, and a callable object."""
 
     class Hill:
         def __call__(self, x):

@@ -208,6 +208,6 @@ def test_a_stated_encoding_is_taken(tmp_path):
 
 
 def test_the_file_is_described_by_params():
-    """What the run tells and records."""
+    """The run reports and records how the file was read."""
     params = IrregularityParams(file=str(DATA / "gaps.csv"), file_bridge=1.0)
     assert make_irregularity(params, 0.0).description.startswith("gaps.csv: read as UTF-8, separated by commas")

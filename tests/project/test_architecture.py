@@ -137,3 +137,14 @@ def test_every_package_is_shipped():
     folders = {path.parent for path in HOST if path.name == "__init__.py"}
     names = {".".join(("tiengine", *folder.relative_to(ENGINE).parts)) for folder in folders}
     assert set(listed) == names | {"tiengine.kernels"}
+
+
+TEXTS = [path for folder in ("tiengine", "kernels", "validation") for path in sorted((ROOT / folder).rglob("*.py"))]
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_docstrings_begin_with_a_verb_or_the_noun_they_name(path):
+    """A docstring that begins with "What" or "Of" leaves its subject to the reader."""
+    found = [node.value for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Expr)]
+    texts = [value.value for value in found if isinstance(value, ast.Constant) and isinstance(value.value, str)]
+    assert [text.splitlines()[0] for text in texts if text.split()[:1] in (["What"], ["Of"], ["Who"])] == []

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper
+from tiengine.engine.state import DISPLACEMENT
 from tiengine.kernels import layout as at
 from tiengine.recording.seat_envelopes import SeatEnvelopes, watched_seats
 from tiengine.recording.slab_envelopes import SlabEnvelopes
@@ -33,11 +34,11 @@ def test_envelopes_are_the_extremes_of_every_step(zone):
     length, d = run.model.ingredients.length, run.model.ingredients.slab.fastening_pitch
 
     def look() -> None:
-        s = stepper.chunk.clock[stepper.rows.step, at.FIRST_SEAT_S] + np.arange(state.seat_force.shape[-1]) * d
+        s = stepper.chunk.clock[stepper.rows.step, at.FIRST_SEAT_S] + np.arange(state.seat_forces.shape[-1]) * d
         assert zone <= s[first] < zone + 2.0 * d
         assert length - zone - 2.0 * d < s[end - 1] <= length - zone
         for place in range(first, end):
-            seen[state.first_seat + place].append(state.seat_force[0, :, :2, place].copy())
+            seen[state.first_seat + place].append(state.seat_forces[0, :, :2, place].copy())
 
     stepper.watch("envelopes", envelopes.watch)
     stepper.watch("look", look)
@@ -92,7 +93,7 @@ def test_slabs_against_their_coordinates(mortar):
     def look() -> None:
         held.append(run.state.first_slab)
         for number in range(held[-1], held[-1] + slots):
-            u = run.state.view(at.U, "slabs")[0, number % slots]
+            u = run.state.slab_motion(DISPLACEMENT)[0, number % slots]
             moments = np.tensordot(u, operator, 1)
             under_seats = [
                 shape @ u[index]
@@ -150,7 +151,7 @@ def test_what_is_kept_can_be_saved_and_restored():
 
     half = Run(model, V350, X=whole.X - 150 * V350 * DT, steps=150, start=False)
     half.state = state
-    half.stepper = SineStepper(model, state, half.chunk)
+    half.stepper = make_stepper(model, state, half.chunk)
     others = watched(half)
     for each, values in zip(others, saved, strict=True):
         each.restore(values)

@@ -30,7 +30,7 @@ SEAT = {"name": "c", "on": "fastening", "chainage": 20.0, "side": "right"}
         ([RAIL | {"name": "../x"}], r"gauges\[0\].name = '../x': must be made of"),
         ([RAIL | {"on": "sleeper"}], r"gauges\[0\].on = 'sleeper': must be 'rail', 'slab' or 'fastening'"),
         ([RAIL | {"chainage": -1.0}], r"gauges\[0\].chainage = -1.0: must be greater than or equal to 0 m"),
-        ([RAIL | {"chainage": 1e3}], r"gauges\[0\].chainage = 1000: must be between 0 and 38 m"),
+        ([RAIL | {"chainage": 1e3}], r"gauges\[0\].chainage = 1000: must be between 0 and 46 m"),
         ([RAIL | {"side": None}], r"gauges\[0\].side: missing; a gauge on a rail needs 'left' or 'right'"),
         ([RAIL | {"y": 0.1}], r"gauges\[0\].y = 0.1: only for a gauge on a slab"),
         ([SEAT | {"side": "up"}], r"gauges\[0\].side = 'up': must be 'left' or 'right'"),

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from tiengine.engine.chunk import Chunk
-from tiengine.engine.sine_state import SineState
-from tiengine.engine.sine_stepper import SineStepper
+from tiengine.engine.kinds import make_stepper, state_at_rest
+from tiengine.engine.state import PARTS, VELOCITY
 from tiengine.engine.stepper import Rows
-from tiengine.kernels import layout as at
-from tiengine.kernels.wheel_rail import SHIFT
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recording.guards import Guard, climbing_shift
 from tiengine.scenario.event_policy import Events
@@ -29,11 +27,11 @@ def guard() -> Guard:
 
 
 def guard_of(policy: Events, track_end: float = np.inf) -> Guard:
-    model = model_of("smooth", "numerics.modes_per_metre=2", dt=STEP)
-    state = SineState.at_rest(model)
+    model = model_of("smooth", dt=STEP)
+    state = state_at_rest(model)
     state.enter(0, 0)
-    state.force[..., 0] = 7e4
-    stepper = SineStepper(model, state, Chunk.empty(model.ingredients, 1, 1, 1))
+    state.normal_force[...] = 7e4
+    stepper = make_stepper(model, state, Chunk.empty(model.ingredients, 1, 1, 1))
     return Guard.watching(stepper, policy, np.full(1, track_end))
 
 
@@ -74,7 +72,9 @@ def test_it_checks_every_millisecond_and_after_the_last_step(guard: Guard, monke
 )
 def test_numbers_that_run_away_end_a_train(guard: Guard, block: str, index: tuple[int, ...], words: str, value: float):
     """The field is named; the train is taken out of the way."""
-    guard.state.view(at.V, block)[index] = value
+    values = guard.state.part(0, block)[VELOCITY]
+    values[index[1:]] = value
+    guard.state.put(VELOCITY, block, values[None])
     guard.check(10, 42.0)
     event = only(guard)
     assert event.kind == "runaway"
@@ -84,14 +84,14 @@ def test_numbers_that_run_away_end_a_train(guard: Guard, block: str, index: tupl
     assert np.any([word in str(event) for word in words.replace("\\", "").split("|")]) or block == "vehicles"
     assert "(t = 0.0020 s, chainage 42.00 m)" in str(event)
     assert "numerics.time_step = 0.0001" in str(event)
-    assert not guard.state.motion[: at.A + 1].any()
+    assert not any(guard.state.part(0, name).any() for name in PARTS)
     guard.check(15, 42.1)
     assert guard.take() == {}
 
 
 def test_a_wheel_that_stays_off_its_rail_is_noted_once(guard: Guard):
     """50 ms without load, seen at the fiftieth check; it stays one event while it lasts."""
-    guard.state.force[0, 2, 1, 0] = 0.0
+    guard.state.normal_force[0, 2, 1] = 0.0
     for check in range(1, 50):
         guard.check(5 * check, 10.0)
     assert guard.take() == {}
@@ -106,7 +106,7 @@ def test_a_wheel_that_stays_off_its_rail_is_noted_once(guard: Guard):
 def test_a_flight_that_ends_in_time_is_no_event(guard: Guard):
     """40 ms off, then loaded, then 40 ms off again."""
     for load in (0.0, 7e4, 0.0):
-        guard.state.force[0, 0, 0, 0] = load
+        guard.state.normal_force[0, 0, 0] = load
         for check in range(1 if load else 40):
             guard.check(5 * (check + 1), 10.0)
     assert guard.take() == {}
@@ -116,11 +116,11 @@ def test_climbing_and_derailing(guard: Guard):
     """The flange first, the end of the profile next; the latter ends the train."""
     climb = climbing_shift(guard.stepper.ingredients.contact)
     assert 11.5e-3 < climb < 12.5e-3  # LMA on CHN60: the flank of 70 degrees ends at 12.1 mm (contact table)
-    guard.state.contact[0, 1, 0, SHIFT] = climb + 1e-4
+    guard.state.relative_shift[0, 1, 0] = climb + 1e-4
     guard.check(5, 10.0)
     event = only(guard)
     assert (event.kind, event.wheelset, event.side, event.stops) == ("flange_climb", 2, "left", False)
-    guard.state.contact[0, 1, 0, SHIFT] = 14e-3
+    guard.state.relative_shift[0, 1, 0] = 14e-3
     guard.check(10, 10.1)
     event = only(guard)
     assert (event.kind, event.stops) == ("derailment", True)
@@ -130,14 +130,29 @@ def test_climbing_and_derailing(guard: Guard):
 def test_the_scenario_decides(guard: Guard):
     """A derailment that is only recorded, a climb that stops."""
     guard = guard_of(Events(derailment="record", flange_climb="stop"))
-    guard.state.contact[0, 0, 0, SHIFT] = 12.4e-3
+    guard.state.relative_shift[0, 0, 0] = 12.4e-3
     guard.check(5, 1.0)
     assert only(guard).stops
     guard = guard_of(Events(derailment="record"))
-    guard.state.contact[0, 0, 0, SHIFT] = 14e-3
+    guard.state.relative_shift[0, 0, 0] = 14e-3
     guard.check(5, 1.0)
     assert {event.kind: event.stops for event in guard.take()[0]} == {"flange_climb": False, "derailment": False}
     assert guard.stopped == {}
+
+
+@pytest.mark.parametrize("policy", ["stop", "record"])
+def test_forces_that_alternate_from_step_to_step(policy: str):
+    """A lateral force of 5 kN to and fro: found once it has lasted for 0.1 s, in a look every 20 ms."""
+    guard = guard_of(Events(oscillation=policy))
+    guard.load(0, np.arange(1000.0))
+    for i in range(1000):
+        guard.stepper.rows = Rows(i)
+        guard.state.forces_on_rails[0, 1, 0, 1] = 5e3 * np.exp(1e-3 * i) * (-1) ** i
+        guard.watch_step()
+    event = only(guard)
+    assert (event.kind, event.wheelset, event.side, event.stops) == ("oscillation", 2, "left", policy == "stop")
+    assert event.time == pytest.approx(0.11, abs=0.021)
+    assert "numerics.time_step = 0.0001 or more passes" in event.words
 
 
 def test_the_end_of_a_measured_track(guard: Guard):
@@ -156,8 +171,6 @@ def test_the_end_of_a_measured_track(guard: Guard):
 
 SHORT = {
     "train.distance": 6.0,
-    "numerics.modes_per_metre": 2.0,
-    "numerics.truncation": "none",
     "numerics.time_step": STEP,
     "irregularity.taper": 1.0,
 }

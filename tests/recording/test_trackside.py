@@ -43,7 +43,8 @@ FAR = {"name": "far", "on": "rail", "chainage": 35.9, "side": "left"}
 CASE = {
     "train.distance": 8.0,
     "numerics.time_step": DT,
-    "numerics.truncation": "none",  # else wheels feel the compliance of modes that the gauges' rail has not
+    "numerics.window": 28.0,
+    "numerics.truncation": "none",  # else wheels feel a compliance that the gauges' rail has not
     "output.precision": "double",
     "output.body_interval": 1e-3,
     "output.deflection_interval": 1e-2,
@@ -102,9 +103,12 @@ def test_a_failed_fastening_carries_nothing_and_its_neighbours_more(result):
 
 
 def test_envelopes_go_along_the_whole_way(result):
-    """Seats and slabs without gaps from the window's rear end at the start to its front end at the end."""
+    """Seats and slabs without gaps from the window's rear end at the start to its front end at the end.
+
+    The rear place of the window is left out: at times its seat reaches over the end.
+    """
     seats, slabs = result.seats(), result.slabs()
-    np.testing.assert_array_equal(seats["seat"], np.arange(seats["seat"][-1] + 1))
+    np.testing.assert_array_equal(seats["seat"], np.arange(1, seats["seat"][-1] + 1))
     np.testing.assert_allclose(seats["chainage"], (seats["seat"] + 0.5) * 0.63, rtol=1e-12)
     assert 36.0 - 2.0 * 0.63 < seats["chainage"][-1] <= 36.0 + 0.02
     np.testing.assert_array_equal(slabs["slab"], np.arange(slabs["slab"][-1] + 1))
@@ -160,7 +164,7 @@ def test_snapshots_show_joints_and_fixed_ends(result):
     assert len(bent["time"]) == STEPS * DT // 0.01
     np.testing.assert_allclose(np.diff(bent["offset"]), 0.25, atol=0.01)
     assert bent["offset"][0] == pytest.approx(-14.0, abs=1.0)
-    np.testing.assert_allclose(bent["rail"][..., [0, -1]], 0.0, atol=1e-15)  # sines of whole half waves
+    np.testing.assert_allclose(bent["rail"][..., [0, -1]], 0.0, atol=1e-15)  # pinned ends
     chainage = bent["position"][:, None] + bent["offset"]
     slab = np.floor(chainage / 5.67)
     in_joint = np.abs(chainage - (slab + 0.5) * 5.67) > 5.6 / 2.0
@@ -198,7 +202,7 @@ def test_rail_velocities_are_rates():
     errors = []
     for dt in (1e-4, 5e-5):
         changes = {"numerics__time_step": dt, "irregularity__spectrum": "none", "train__distance": 6.0}
-        changes["numerics__modes_per_metre"] = 2.0
+        changes |= {"numerics__modes_per_metre": 2.0, "numerics__trial_functions": "sines"}
         with result_of(**changes, track__failed_fastenings=[], track__mortar_voids=[]) as smooth:
             gauge = smooth.gauges()["rail"]
         near = np.abs(gauge["position"] - GAUGES[0]["chainage"]) < 10.0

@@ -126,7 +126,7 @@ def test_report_refuses(file):
 
 
 class Page(HTMLParser):
-    """What a browser would make of a page: elements closed in order, addresses, texts."""
+    """Page as a browser parses it: elements closed in order, addresses, texts."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -224,7 +224,7 @@ def test_key_figures_of_a_poor_file(tmp_path, few_figures):
 
 
 def test_the_worst_is_the_smallest_where_less_is_worse():
-    """Of 3, 1, 2: the worst is 1, the median 2."""
+    """The worst of 3, 1, 2 is 1, their median 2."""
     (summary,) = summarise(
         [(i, [KeyFigure("Q", value, "kN", smallest=True)]) for i, value in enumerate((3.0, 1.0, 2.0))]
     )

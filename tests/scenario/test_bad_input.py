@@ -50,7 +50,7 @@ def test_a_wrong_value(tmp_path, setting, words):
 
 
 def test_an_unstable_step(tmp_path):
-    """What only the trial of the step itself can tell."""
+    """Only the trial of the step itself can tell."""
     settings = ("numerics.time_step=1e-3", "numerics.modes_per_metre=8")
     arguments = [word for setting in settings for word in ("--set", setting)]
     assert_refused(tmp_path, ("default", *arguments), "numerics.time_step = 0.001", "unstable", "choose")

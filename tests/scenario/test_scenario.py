@@ -16,6 +16,7 @@ from tiengine.parameters.presets import KINDS, find_preset, preset_names, preset
 from tiengine.scenario.overrides import parse_value
 from tiengine.scenario.scenario import check_wavelength, load_scenario, to_toml
 from tiengine.track.defects import FailedFastenings, fastening_factors
+from tiengine.track.sines import Sines
 from tiengine.vehicle.vehicle import load_vehicle
 
 TRAIN = {"vehicles": ["CRH380A_v2"], "speed_kmh": 300.0, "distance": 100.0}
@@ -36,7 +37,7 @@ def test_paper_is_the_papers_case():
     assert paper.train.speed.is_constant
     assert paper.train.speed.fastest == pytest.approx(350 / 3.6, rel=1e-15)  # one rounding
     assert paper.train.distance == 600.0
-    assert (paper.window_length, paper.modes) == (36.0, 60)
+    assert (paper.window_length, paper.trial_functions) == (36.0, Sines(36.0, 60))
     assert paper.numerics.start == "equilibrium"
     assert paper.irregularity.spectrum == "german_low"
     parts = paper.parts

@@ -30,7 +30,6 @@ from tiengine.simulation.tasks import plan
 SHORT = {
     "train.distance": 3.0,
     "train.speed_kmh": 300.0,
-    "numerics.modes_per_metre": 2.0,
     "numerics.truncation": "none",
     "numerics.time_step": 2e-4,
     "output.precision": "double",
@@ -133,7 +132,7 @@ def test_measured_files_are_found_beside_the_scenario(tmp_path):
         ({"size": 2, "seeds": [1, 2], "vary": {"irregularity.seed": [1, 2]}}, "'irregularity.seed' cannot vary if"),
         (
             {"size": 2, "seeds": [1, 2], "vary": {"irregularity.spectrum": ["none"]}},
-            "ensemble.seeds: no effect without",
+            "ensemble.seeds: must be left out where no train",
         ),
     ],
 )
@@ -165,7 +164,7 @@ def test_a_group_is_cut_into_equal_tasks():
 
 def test_bits_of_a_train_do_not_depend_on_its_neighbours(monkeypatch):
     """Beside others, or filled up with copies of itself: a task of equal size gives the same bits."""
-    monkeypatch.setattr(simulate, "plan", lambda scenario: plan(scenario, together=2))
+    monkeypatch.setattr(simulate, "plan", lambda scenario, **given: plan(scenario, together=2, **given))
     with simulate.run(ensemble(size=3), workers=1) as three, simulate.run(ensemble(size=2, seeds=[3, 8])) as two:
         assert_same_bits(three, two, 2, 0)
         assert three.trains == 3

@@ -19,7 +19,6 @@ from tiengine.simulation import simulate
 SHORT = {
     "train.distance": 45.0,  # three chunks of 1000 steps at 300 km/h
     "train.speed_kmh": 300.0,
-    "numerics.modes_per_metre": 2.0,
     "numerics.truncation": "none",
     "numerics.time_step": 2e-4,
     "output.precision": "double",
@@ -38,7 +37,7 @@ def hill(x, height=1e-3):
 
 
 def slopes(x):
-    """Of the hill."""
+    """Slope of the hill."""
     return -1e-4 * np.pi * np.sin(0.1 * np.pi * x), 0.0, 0.0, 0.0
 
 

@@ -1,8 +1,8 @@
 """Reader of MiniProf profiles, ``.whl`` and ``.ban``.
 
 ``key=value`` lines (or the free text of the old style), then rows of the columns that ``ColumnDef`` names, x and y
-first unless it says otherwise; ``"``, ``!`` and ``%`` begin comments. Understood and reported: rows quoted out, words
-behind a row, a row of flange dimensions in an old header.
+first unless it says otherwise; ``"``, ``!``, ``%`` and ``#`` begin comments. Understood and reported: rows quoted out,
+words behind a row, a row of flange dimensions in an old header.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ def read_miniprof(lines: Lines, kind: Kind, where: str) -> PointList:
     """
     header: dict[str, str] = {}
     body = _Body()
-    texts = [(number, line, re.split('["!%]', line)[0].strip()) for number, line in lines]
+    texts = [(number, line, re.split('["!%#]', line)[0].strip()) for number, line in lines]
     decimal_commas = has_decimal_commas([text for _, _, text in texts if "=" not in text])
     for number, line, text in texts:
         if not text:
-            body.quoted.append(len(leading_numbers(split_row(line.strip().strip('"'), decimal_commas))))
+            body.quoted.append(len(leading_numbers(split_row(line.strip(' \t"!%#'), decimal_commas))))
             continue
         fields = split_row(text, decimal_commas)
         values = leading_numbers(fields)

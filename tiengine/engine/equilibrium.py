@@ -8,7 +8,7 @@ takes the contact's derivatives by differences, all of them in one launch over a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ __all__ = ["ContactForces", "equilibrium", "evaluate_contact", "release"]
 
 NEWTON = 60
 FORCE_TOLERANCE = 1e-4  # N: a billionth of a wheel load
+EASY_FRICTION = 0.3  # from the guess Newton's method is known to converge
+FRICTION_RATIO = 1.5  # from one friction to the next, where the creep forces change by a few per cent
 NUDGE_COORDINATE = 1e-8  # m, rad
 NUDGE_RATE = 1e-6  # rad/s
 NUDGE_FORCE = 1.0  # N
@@ -180,26 +182,54 @@ class _Problem:
         return np.hstack([out, (found.rail - force).reshape(len(y), -1)])
 
     def solve(self) -> NDArray[np.float64]:
-        """Newton's method with halved steps; shape (n + 6 W,)."""
-        y = self._guess()
-        n = self.train.n
-        nudge = np.full(len(y), NUDGE_COORDINATE)
+        """Newton's method, from high friction down to the scenario's where it fails at once; shape (n + 6 W,).
+
+        At low friction spin alone nearly saturates the creep forces: from the guess, which has none, Newton's method
+        oversteps into sliding, where nothing tells the way back.
+        """
+        wanted = float(self.model.constants[at.FRICTION])
+        y, size = self._newton(self._guess())
+        if size < FORCE_TOLERANCE:
+            return y
+        reached, y = np.inf, self._guess()
+        steps = 1 + max(int(np.ceil(np.log(EASY_FRICTION / wanted) / np.log(FRICTION_RATIO))), 0)
+        for friction in np.geomspace(max(EASY_FRICTION, wanted), wanted, steps):
+            self._set_friction(float(friction))
+            y, left = self._newton(y)
+            if not left < FORCE_TOLERANCE:
+                break
+            reached = float(friction)
+        self._set_friction(wanted)
+        if reached <= wanted:
+            return y
+        limit = f", only down to track.friction = {reached:.3g}: wheels would slide" if np.isfinite(reached) else ""
+        raise InputError(
+            f"numerics.start = 'equilibrium': no steady rolling found at {self.V * 3.6:g} km/h"
+            f" (forces out of balance by {size:.3g} N){limit}; use start = 'zero'"
+        )
+
+    def _set_friction(self, friction: float) -> None:
+        constants = self.model.constants.copy()
+        constants[at.FRICTION] = friction
+        self.model = replace(self.model, constants=constants)
+
+    def _newton(self, y: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Newton's method with halved steps from a state; the last state, and how far it is out of balance [N]."""
+        n, m = self.train.n, len(y)
+        nudge = np.full(m, NUDGE_COORDINATE)
         nudge[self.pitch], nudge[n:] = NUDGE_RATE, NUDGE_FORCE
+        size = np.inf
         for _ in range(NEWTON):
             values = self.residual(np.vstack([y, y + np.diag(nudge), y - np.diag(nudge)]))
             size = float(np.abs(values[0]).max())
             if size < FORCE_TOLERANCE:
-                return y
-            m = len(y)
+                break
             J = (values[1 : m + 1] - values[m + 1 :]).T / (2.0 * nudge)
             step = np.linalg.lstsq(J, -values[0], rcond=1e-14)[0]
             shares = 0.5 ** np.arange(8)
             trials = y + shares[:, None] * step
             y = trials[int(np.argmin(np.abs(self.residual(trials)).max(axis=1)))]
-        raise InputError(
-            f"numerics.start = 'equilibrium': no steady rolling found at {self.V * 3.6:g} km/h"
-            f" (forces out of balance by {size:.3g} N); use start = 'zero'"
-        )
+        return y, size
 
     def _guess(self) -> NDArray[np.float64]:
         """Vertical equilibrium on linearised contact springs, the track held."""

@@ -99,6 +99,11 @@ class SineState(State):
         return self.force[..., 0]
 
     @property
+    def forces_on_rails(self) -> Reals:
+        """Vertical, lateral and roll force of every wheel on its rail, shape (B, W, 2, 3)."""
+        return self.rail_force
+
+    @property
     def relative_shift(self) -> Reals:
         """Outward shift of every wheel against its rail [m], shape (B, W, 2)."""
         return self.contact[..., SHIFT]
@@ -107,11 +112,6 @@ class SineState(State):
     def seat_forces(self) -> Reals:
         """Forces of the rails on the seats, shape (B, 2, 3, seats)."""
         return self.seat_force
-
-    def widen(self, smallest: Reals, largest: Reals) -> None:
-        """Widen extremes by the seats' forces of the last step."""
-        np.maximum(largest, self.seat_force, out=largest)
-        np.minimum(smallest, self.seat_force, out=smallest)
 
     def body_motion(self, kind: int) -> Reals:
         """Motion of the bodies, shape (B, 5 bodies)."""

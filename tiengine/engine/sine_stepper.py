@@ -67,11 +67,6 @@ class SineStepper(Stepper):
         )
         self.bind()
 
-    @property
-    def seat_extremes_due(self) -> bool:
-        """After every step: nothing keeps them."""
-        return True
-
     def _stages(self) -> Iterator[Stage]:
         """Stages of the step in their order; :mod:`tiengine.kernels.step` gives the equations."""
         self._launches.clear()

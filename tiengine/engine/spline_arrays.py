@@ -1,4 +1,4 @@
-"""What a spline step changes: the arrays of vectors, and the way from them to plain numbers."""
+"""State of a spline step: arrays of vectors, and their conversion to plain numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NOTHING_SEEN = 1e300
 
 @dataclass(frozen=True, eq=False)
 class SplineArrays:
-    """What a step changes, and the way to its numbers; B trains in chunks of lanes / 2.
+    """State of a spline step and access to its numbers; B trains in chunks of lanes / 2.
 
     Attributes:
         trains: B.
@@ -125,9 +125,19 @@ class SplineArrays:
         for i, dof in enumerate(self.cars.car):
             view[:, i, : len(dof)] = values[:, dof]
 
-    def cars_row(self, row: int) -> Floats:
-        """A row of the cars as a view, unused places included: shape (B, cars, places)."""
-        return self._car_view(row)
+    def squares(self) -> Floats:
+        """Sums of the squares of rows U, V, A over all coordinates, those of trains that fill a chunk included."""
+        rails = self.rail.reshape(-1, at.RAIL_ROWS * self.lanes)[:, : 3 * 5 * self.lanes]
+        slabs = self.slab.reshape(-1, at.SLAB_ROWS * 8)[:, : 3 * 8]
+        cars = self.car.reshape(-1, at.CAR_ROWS * self.cars.blocks * 8)[:, : 3 * self.cars.blocks * 8]
+        return sum((_squares(part) for part in (rails, slabs, cars)), np.zeros(3))
+
+    def bed_motion(self, k: float, c: float) -> Floats:
+        """Stiffness k times u plus damping c times v of all slabs, shape (B, groups, N, 8)."""
+        N, K = self.slab_dofs, self.half_width
+        groups = len(self.slab_design) // self._whole
+        whole = self.slab.reshape(self._whole, groups, N + 2 * K, at.SLAB_ROWS, 8)[: self.trains, :, K : K + N]
+        return k * whole[..., at.U, :] + c * whole[..., at.V, :]
 
     @property
     def designs(self) -> NDArray[np.int64]:
@@ -182,3 +192,10 @@ class SplineArrays:
     @property
     def _padded(self) -> int:
         return self.functions + 2 * at.REACH
+
+
+def _squares(rows: Floats) -> Floats:
+    """Sums of the squares of three rows side by side, shape (m, 3 k), each: shape (3,)."""
+    three = rows.reshape(len(rows), 3, -1)
+    found: Floats = np.einsum("mrk,mrk->r", three, three)
+    return found

@@ -96,6 +96,11 @@ class SplineState(State):
         return self.wheels.force[..., 0]
 
     @property
+    def forces_on_rails(self) -> Reals:
+        """Vertical, lateral and roll force of every wheel on its rail, shape (B, W, 2, 3)."""
+        return self.wheels.rail_force
+
+    @property
     def relative_shift(self) -> Reals:
         """Outward shift of every wheel against its rail [m], shape (B, W, 2)."""
         return self.wheels.contact[..., SHIFT]
@@ -139,12 +144,8 @@ class SplineState(State):
 
     def squares(self) -> tuple[float, float, float]:
         """Sums of the squares of all coordinates, of their rates and of their second rates."""
-        u, v, a = (self._square(row) for row in ROWS.values())
+        u, v, a = self.held.squares()
         return u, v, a
-
-    def _square(self, row: int) -> float:
-        parts = (self.held.rails(row), self.held.slabs(row), self.held.cars_row(row))
-        return sum(float(np.dot(flat, flat)) for flat in (part.reshape(-1) for part in parts))
 
     def part(self, train: int, name: str) -> Reals:
         """Coordinates of a part of one train, and their first and second rates."""

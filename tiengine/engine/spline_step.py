@@ -39,7 +39,7 @@ class Suspension:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """What the contact solve reads and leaves, shapes as ``engine.sine_state`` and ``model.model`` have them.
+    """Arrays that the contact solve reads and leaves, shapes as ``engine.sine_state`` and ``model.model`` have them.
 
     Attributes:
         wheel: r0, b0, spin inertia, shape (W, 3).

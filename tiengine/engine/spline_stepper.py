@@ -9,7 +9,6 @@ import numpy as np
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.spline_state import SplineState
 from tiengine.engine.spline_step import SplineStep, Suspension
-from tiengine.engine.state import DISPLACEMENT, VELOCITY
 from tiengine.engine.stepper import Stage, Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.spline_model import SplineModel
@@ -51,9 +50,11 @@ class SplineStepper(Stepper):
         self._compiled = self.launch.launch.compile_seconds
         self.factored_speed = float("nan")
         self._window = (-1, -1)
+        self._pending = 0
         self._explicit_bed = int(model.dims[at.MORTAR_MODE]) > 0
         rows, dofs = chunk.body.shape[1], state.tables.slabs.dofs
-        self._bed = np.zeros((state.trains, rows, state.slots, dofs))
+        groups = -(-state.slots // 8)
+        self._bed = np.zeros((state.trains, rows, groups, dofs, 8))
         self._design = np.zeros((rows, state.slots), dtype=np.int64)
         self.bind()
 
@@ -61,7 +62,7 @@ class SplineStepper(Stepper):
     def seat_extremes_due(self) -> bool:
         """Whether the seats move on before the next step, or the chunk ends: the launch keeps extremes until then."""
         coming = self.rows.step + 1
-        return coming >= len(self.moves) or bool(self.moves[coming])
+        return coming >= len(self.moves) or self._changes(coming) != (False, False)
 
     def _stages(self) -> Iterator[Stage]:
         """Stages of the step in their order; :mod:`tiengine.kernels.spline_step` gives the equations."""
@@ -71,22 +72,31 @@ class SplineStepper(Stepper):
 
     def _enter(self) -> None:
         """Let seats and slabs in and out where they change; factorise again when the speed has changed enough."""
-        i = self.rows.step
+        window, speed = self._changes(self.rows.step)
+        clock = self.chunk.clock[self.rows.step]
+        if window:
+            self._window = int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])
+            self.state.enter(*self._window)
+        if speed:
+            self.factor(float(clock[at.SPEED]))
+
+    def _changes(self, i: int) -> tuple[bool, bool]:
+        """Whether seats or slabs move on, and whether tables are to be made for another speed, before step ``i``."""
         if not self.moves[i]:
-            return
-        clock = self.chunk.clock[i]
-        window, V = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])), float(clock[at.SPEED])
-        if window != self._window:
-            self._window = window
-            self.state.enter(*window)
-        factored = self.factored_speed
-        if V != factored and not abs(V - factored) < REFACTOR * factored:
-            self.factor(V)
+            return False, False
+        clock, factored = self.chunk.clock[i], self.factored_speed
+        V = float(clock[at.SPEED])
+        window = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])) != self._window
+        return window, V != factored and not abs(V - factored) < REFACTOR * factored
 
     def _advance(self) -> None:
+        """Take this step, with those put off before it, unless nothing reads the state after it."""
         i, wheel_row, body_row = self.rows
         self.launch.record[i] = wheel_row, body_row
-        self.launch(i)
+        self._pending += 1
+        if body_row >= 0 or self.watched or self.seat_extremes_due:
+            self.launch(i + 1 - self._pending, self._pending)
+            self._pending = 0
 
     def _record_bed(self) -> None:
         """Keep the bed's motion, or its pressures, if this step records the bodies."""
@@ -97,8 +107,7 @@ class SplineStepper(Stepper):
         if self._explicit_bed:
             self.chunk.mortar[:, row] = state.bed.pressure
             return
-        k, c = self.model.bed_numbers[:2]
-        self._bed[:, row] = k * state.slab_motion(DISPLACEMENT) + c * state.slab_motion(VELOCITY)
+        self._bed[:, row] = state.held.bed_motion(*self.model.bed_numbers[:2])
         self._design[row] = state.held.designs[: state.slots]
 
     def finish(self, body_rows: int) -> None:
@@ -112,7 +121,8 @@ class SplineStepper(Stepper):
         kinds = self._design[:rows].ravel()
         factor, at_rest = (values.reshape(len(values), -1)[kinds] for values in (m.bed_factor, m.bed_rest))
         for bed, out in zip(self._bed[:, :rows], self.chunk.mortar[:, :rows], strict=True):
-            pressure = bed.reshape(len(kinds), -1) @ m.bed_points
+            by_slot = bed.transpose(0, 1, 3, 2).reshape(rows, -1, bed.shape[2])[:, : self.state.slots]
+            pressure = by_slot.reshape(len(kinds), -1) @ m.bed_points
             pressure *= factor
             pressure += at_rest
             out[..., 0] = pressure.max(axis=1).reshape(out.shape[:2])

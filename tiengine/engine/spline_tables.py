@@ -70,7 +70,7 @@ def spans_of(knots: Floats, combine: Floats | None = None) -> Spans:
 
 @dataclass(frozen=True, eq=False)
 class RailTables:
-    """What the rails' kernels read; depends on the speed.
+    """Tables that the rails' kernels read; they depend on the speed.
 
     Attributes:
         coefficient: See ``spline_layout``, shape (n N_COEFFICIENT,).

@@ -54,6 +54,11 @@ class State(ABC):
 
     @property
     @abstractmethod
+    def forces_on_rails(self) -> Reals:
+        """Vertical [N], lateral [N] and roll force [N m] of every wheel on its rail, shape (B, W, 2, 3); a view."""
+
+    @property
+    @abstractmethod
     def relative_shift(self) -> Reals:
         """Outward shift of every wheel against its rail [m], shape (B, W, 2); a view that stays valid."""
 
@@ -65,9 +70,8 @@ class State(ABC):
         Shape (B, 2 rails, 3, seats of the window from the rear).
         """
 
-    @abstractmethod
     def widen(self, smallest: Reals, largest: Reals) -> None:
-        """Widen extremes in place by the seats' forces of all steps since the last call, or of the last step.
+        """Widen extremes in place by the seats' forces of the last step, or of all steps since the last call.
 
         A recorder calls it after those steps at which :attr:`Stepper.seat_extremes_due` says so.
 
@@ -75,6 +79,9 @@ class State(ABC):
             smallest: Shape as :attr:`seat_forces`.
             largest: Same shape.
         """
+        forces = self.seat_forces
+        np.minimum(smallest, forces, out=smallest)
+        np.maximum(largest, forces, out=largest)
 
     @abstractmethod
     def body_motion(self, kind: int) -> Reals:

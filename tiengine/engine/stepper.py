@@ -68,13 +68,14 @@ class Stepper(ABC):
         self.moves = np.zeros(0, dtype=np.bool_)
         self.stages: tuple[Stage, ...] = ()
         self.watchers: list[Stage] = []
+        self._due: list[Callable[[], bool]] = []
         self._calls: tuple[Call, ...] = ()
         self._mark: Callable[[str], object] | None = None
 
     @property
-    @abstractmethod
     def seat_extremes_due(self) -> bool:
-        """Whether the extremes of the seats' forces must be taken from the state after this step."""
+        """Whether the extremes of the seats' forces must be taken from the state after this step; by default always."""
+        return True
 
     @abstractmethod
     def _stages(self) -> Iterator[Stage]:
@@ -105,17 +106,25 @@ class Stepper(ABC):
         self.stages = tuple(self._stages())
         self._bind_calls()
 
-    def watch(self, name: str, call: Call, before: str | None = None) -> None:
+    def watch(self, name: str, call: Call, before: str | None = None, due: Callable[[], bool] = lambda: True) -> None:
         """Call something at the end of every step.
 
         Args:
             name: Name of this stage.
             call: Reads :attr:`state`, :attr:`chunk` and :attr:`rows`.
             before: Name of the watcher that it precedes; None: it is the last.
+            due: Called within a step: whether ``call`` will read the state after it. A step may put off its work until
+                one is due.
         """
         names = [each for each, _ in self.watchers]
         self.watchers.insert(len(names) if before is None else names.index(before), (name, call))
+        self._due.append(due)
         self._bind_calls()
+
+    @property
+    def watched(self) -> bool:
+        """Whether anything reads the state after this step; without watchers a caller may."""
+        return not self._due or any(due() for due in self._due)
 
     def time_stages(self, mark: Callable[[str], object] | None) -> None:
         """Let a clock be read within the coming steps, or no longer.

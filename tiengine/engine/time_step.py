@@ -8,7 +8,7 @@ from functools import lru_cache
 from tiengine.engine import backend
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.kinds import make_stepper, state_at_rest
-from tiengine.engine.stability import TOLERATED_GROWTH, energy_growth
+from tiengine.engine.stability import of_trains, step_growth, with_stiffest_seats
 from tiengine.engine.vector_mode import lanes_for
 from tiengine.irregularity.irregularity import IrregularityParams
 from tiengine.irregularity.track_checks import check_step, shortest_wavelength
@@ -19,11 +19,15 @@ from tiengine.model.spline_model import DivergingPassesError
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario, check_wavelength, to_toml
 from tiengine.scenario.tables import Output
+from tiengine.track.defects import largest_factor
 
 __all__ = ["AUTO_STEPS", "prepare"]
 
 AUTO_STEPS = (2e-4, 1e-4, 5e-5, 2.5e-5)
 """Steps that "auto" tries [s], the longest first: 2e-4 s keeps wheel forces within 0.3 % of their peak (README)."""
+
+MORE_PASSES = 2
+"""Passes that advice tries beyond those of the scenario."""
 
 
 def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) -> tuple[Model, float]:
@@ -44,8 +48,8 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     wanted = scenario.numerics.time_step
     V = scenario.train.speed.at(scenario.rear + scenario.centre_in_window)[0]
     fastest = scenario.train.speed.fastest
-    jit, growth = 0.0, ""
     shortest = shortest_wavelength(scenario.irregularity)
+    jit, reason = 0.0, ""
     for dt in AUTO_STEPS if wanted == "auto" else (float(wanted),):
         try:
             check_wavelength(scenario, dt)
@@ -58,21 +62,59 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
         try:
             model = build_model(parts, fastest)
         except DivergingPassesError as error:
-            growth = str(error)
+            reason = str(error)
             continue
         if jit == 0.0:
             chunk = Chunk.empty(parts, 1, 1, 1)
             jit = make_stepper(model, state_at_rest(model, lanes), chunk, public=public_launch).compile()
-        found = energy_growth(model, fastest, lanes)
-        if found <= TOLERATED_GROWTH:
-            if trains > 1 or V != fastest:
-                model = build_model(replace(parts, trains=trains), V)
-            return model, jit
-        growth = f"free vibration of the track grows by a factor {found:.3g} within 80 steps"
-    raise InputError(
-        f"numerics.time_step = {wanted}: unstable; {growth}; choose a shorter step, more passes or fewer"
-        " trial functions"
-    )
+        reason = _instability(scenario, model, lanes)
+        if not reason:
+            if V == fastest:
+                return of_trains(model, trains), jit
+            return build_model(replace(parts, trains=trains), V), jit
+    raise InputError(f"numerics.time_step = {wanted}: unstable; {reason}; {_advice(scenario, parts, lanes)}")
+
+
+def _instability(scenario: Scenario, model: Model, lanes: int) -> str:
+    """How the step of a model fails the trial over the scenario's run; empty if it does not."""
+    V, stiffest = scenario.train.speed.fastest, largest_factor(scenario.track.failed_fastenings)
+    steps = scenario.train.distance / (V * model.ingredients.newmark.dt)
+    try:
+        tried = model if stiffest == 1.0 else build_model(with_stiffest_seats(model.ingredients, stiffest), V)
+    except DivergingPassesError as error:
+        return str(error)
+    growth = step_growth(tried, V, steps, lanes)
+    if growth.tolerable(steps):
+        return ""
+    seats = "" if stiffest == 1.0 else f" on seats stiffened by {stiffest:g}"
+    return f"an oscillation{seats} grows by a factor {growth.over(100):.3g} in 100 steps"
+
+
+def _advice(scenario: Scenario, parts: Ingredients, lanes: int) -> str:
+    """The longest shorter step and the least more passes that stand the trial."""
+    steps = [(f"numerics.time_step = {dt:g}", replace(parts, newmark=Newmark(dt))) for dt in AUTO_STEPS]
+    more = [
+        (f"numerics.passes = {n}", replace(parts, passes=n))
+        for n in range(parts.passes + 1, parts.passes + 1 + MORE_PASSES)
+    ]
+    shorter = [(words, changed) for words, changed in steps if changed.newmark.dt < 0.9 * parts.newmark.dt]
+    found = [words for changes in (shorter, more) if (words := _first_stable(scenario, changes, lanes))]
+    if found:
+        return f"{' or '.join(found)} is stable"
+    stiffened = largest_factor(scenario.track.failed_fastenings) > 1.0
+    return f"choose {'smaller factors in track.failed_fastenings' if stiffened else 'fewer trial functions'}"
+
+
+def _first_stable(scenario: Scenario, changes: list[tuple[str, Ingredients]], lanes: int) -> str:
+    """Words of the first change that stands the trial; empty if none does."""
+    for words, changed in changes:
+        try:
+            model = build_model(changed, scenario.train.speed.fastest)
+        except DivergingPassesError:
+            continue
+        if not _instability(scenario, model, lanes):
+            return words
+    return ""
 
 
 @dataclass(frozen=True)

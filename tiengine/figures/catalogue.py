@@ -49,8 +49,8 @@ KINDS = (
     Kind(
         "forces",
         "Wheel forces",
-        "The filtered forces of the leading wheelset should stay well within the dashed limits; where the grey band"
-        " reaches zero, a wheel has lost contact with the rail.",
+        "The filtered forces of the leading wheelset, in trains of several vehicles of the worst one, should stay well"
+        " within the dashed limits; where the grey band reaches zero, a wheel has lost contact with the rail.",
     ),
     Kind(
         "envelopes",
@@ -79,13 +79,14 @@ KINDS = (
     Kind(
         "ride",
         "Ride",
-        "Floor accelerations over the bogies, filtered as the standards require; they should stay well within the"
-        " dashed limit.",
+        "Floor accelerations over the bogies, in trains of several vehicles of the worst one, filtered as the standards"
+        " require; they should stay well within the dashed limit.",
     ),
     Kind(
         "gauges",
         "Gauges",
-        "Signals that an instrument at that place of the track would record; grey lines mark the passing wheelsets.",
+        "Signals that an instrument at that place of the track would record; grey lines mark the passing"
+        " wheelsets, in trains of several vehicles grey stretches the passing vehicles.",
     ),
     Kind(
         "ensemble",

@@ -11,6 +11,7 @@ from tiengine.figures.one_train import of_one_train
 from tiengine.figures.palette import BLACK
 from tiengine.figures.style import LEFT, RIGHT, new_figure, plain
 from tiengine.indices.train_record import AbsentError, Train
+from tiengine.indices.wheel_extremes import first_samples
 from tiengine.parameters.arrays import Reals
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ MARGIN = 4e-3  # m beyond the outermost contact
 def draw(train: Train) -> Figure:
     """Draw histograms of the contact positions of all left and all right wheels above the profile they touch.
 
-    Samples at which a wheel is off the rail are left out; the run-in is included.
+    Samples at which a wheel is off the rail are left out, and so is the run-in of every wheelset.
 
     Args:
         train: The train.
@@ -42,15 +43,19 @@ def draw(train: Train) -> Figure:
     parts, cant = train.scenario.parts, train.scenario.track.cant
     profiles = {"wheel": parts.wheel, "rail": parts.rail_profile.canted(cant)}
     counts = {name: _Histogram(profiles[body].span) for name, body in names.items()}
-    for _, channels in samples.slices():
-        touching = channels["normal_force"] > 0.0
+    begin = first_samples(train, samples)
+    sample = int(begin.min())
+    for _, channels in samples.slices(sample):
+        counted = (sample + np.arange(len(channels["normal_force"])))[:, None] >= begin
+        sample += len(counted)
+        touching = (channels["normal_force"] > 0.0) & counted[..., None]
         for name, histogram in counts.items():
             histogram.add(channels[name], touching)
     if not next(iter(counts.values())).total.all():
         raise AbsentError(
             f"{train.result.name}: the wheels of one side never touch the rail: there is no contact to draw"
         )
-    figure = new_figure(15.0, f"{train.caption}: contact positions of all wheels while in contact")
+    figure = new_figure(15.0, f"{train.caption}: contact positions of all wheels while in contact, run-in left out")
     axes = figure.subplots(4, 1, height_ratios=(1.1, 1.0, 1.1, 1.0))
     for (name, body), (above, below) in zip(names.items(), (axes[:2], axes[2:]), strict=True):
         _histograms(above, counts[name])

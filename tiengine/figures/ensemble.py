@@ -30,6 +30,8 @@ LEAST_TRAINS = 3
 def draw(result: Result, train: int | None = None) -> Figure:
     """Draw extremes of Q and |Y| of the leading wheelset in stretches of the chainage, over all trains.
 
+    In trains of several vehicles these are extremes of all wheelsets: those that pass a stretch during the run.
+
     Trains that did not complete their run are left out.
 
     Args:
@@ -45,16 +47,17 @@ def draw(result: Result, train: int | None = None) -> Figure:
             f"{result.name}: {len(complete)} complete train(s); bands over trains need {LEAST_TRAINS}: set"
             " ensemble.size and run again"
         )
-    runs = [Train(result, i).samples("wheel", "vertical_force", "lateral_force") for i in complete]
+    trains = [Train(result, i) for i in complete]
+    runs = [each.samples("wheel", "vertical_force", "lateral_force") for each in trains]
+    several = len(trains[0].scenario.parts.vehicles) > 1
     lead = float(runs[0].group["wheelset_offset"][0])
     begin, end = (pick(run.chainage_range[i] for run in runs) + lead for i, pick in ((0, min), (1, max)))
     bins = int(np.clip(np.ceil((end - begin) / STRETCH), 1, MOST_STRETCHES))
-    extremes = np.stack([_extremes(run, begin, end, bins) for run in runs])
+    extremes = np.stack([_extremes(run, begin, end, bins, several=several) for run in runs])
     x: Reals = begin + (end - begin) / bins * (np.arange(bins, dtype=np.float64) + 0.5)
-    figure = new_figure(
-        15.0, f"{result.name.rpartition('/')[2]}: leading wheelset of {len(complete)} trains, stretches of"
-        f" {(end - begin) / bins:.3g} m"
-    )  # fmt: skip
+    whose = "all wheelsets" if several else "leading wheelset"
+    stretches = f"{len(complete)} trains, stretches of {(end - begin) / bins:.3g} m"
+    figure = new_figure(15.0, f"{result.name.rpartition('/')[2]}: {whose} of {stretches}")
     axes = figure.subplots(3, 1, sharex=True)
     titles = ("Largest Q in the stretch", "Smallest Q in the stretch", "Largest |Y| in the stretch")
     for i, (panel, title) in enumerate(zip(axes, titles, strict=True)):
@@ -66,13 +69,16 @@ def draw(result: Result, train: int | None = None) -> Figure:
     return figure
 
 
-def _extremes(run: Samples, begin: float, end: float, bins: int) -> Reals:
+def _extremes(run: Samples, begin: float, end: float, bins: int, *, several: bool) -> Reals:
     """Largest Q, smallest Q and largest |Y| [kN], shape (3, bins); NaN in stretches that the train did not reach."""
-    offset = float(run.group["wheelset_offset"][0])
+    offsets = run.group["wheelset_offset"][:]
     Q, Y = Band(begin, end, bins), Band(begin, end, bins)
     for position, channels in run.slices():
-        Q.add(position + offset, 1e-3 * channels["vertical_force"][:, 0])
-        Y.add(position + offset, 1e-3 * np.abs(channels["lateral_force"][:, 0]))
+        for w, offset in enumerate(offsets if several else offsets[:1]):
+            x = position + offset
+            ahead = x >= begin  # wheels behind come from the smooth track under the train at the start
+            Q.add(x[ahead], 1e-3 * channels["vertical_force"][ahead, w])
+            Y.add(x[ahead], 1e-3 * np.abs(channels["lateral_force"][ahead, w]))
     return np.stack([Q.high, Q.low, Y.high])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,12 +10,13 @@ from numpy.typing import NDArray
 
 from tiengine.figures.curve import Band, Curve, bins_for
 from tiengine.figures.one_train import of_one_train
-from tiengine.figures.palette import GREY
+from tiengine.figures.palette import BLACK, GREY
 from tiengine.figures.style import LEFT, RIGHT, Look, limit_line, new_figure
 from tiengine.indices import en14363, gb5599
-from tiengine.indices.filters import sliding_mean
+from tiengine.indices.filters import low_pass_settling, sliding_mean
 from tiengine.indices.ride import FORCE_CUT_OFF, LEAST_RATE, UNLOADED
 from tiengine.indices.train_record import AbsentError, Samples, Train
+from tiengine.indices.wheel_extremes import first_samples
 from tiengine.parameters.arrays import Reals
 
 if TYPE_CHECKING:
@@ -25,11 +27,20 @@ __all__ = ["draw"]
 
 MEAN = 2.0  # m, length of the standards' sliding means
 OUTWARD = np.array([-1.0, 1.0])  # sign of the outward direction in y, left and right wheel
+TITLES = {
+    "Q": ("Q [kN]", "Vertical force of the wheel on the rail"),
+    "Y": ("Y [kN]", "Lateral force of the wheel on the rail, right positive"),
+    "axle": ("ΣY [kN]", "Lateral force of the wheelset, mean over 2 m"),
+    "quotient": ("Y/Q [-]", "Y over Q, outward positive, mean over 2 m"),
+}
 
 
 @of_one_train
 def draw(train: Train) -> Figure:
-    """Draw Q, Y, sum of Y and Y/Q of the leading wheelset over its chainage, and the range of all wheels behind them.
+    """Draw Q, Y, sum of Y and Y/Q of a wheelset over its chainage, and the range of all wheels behind them.
+
+    The wheelset is the leading one of a single vehicle; of several vehicles it is the worst one in each panel, and a
+    second column shows the range of every wheelset by vehicle.
 
     Args:
         train: The train.
@@ -44,64 +55,112 @@ def draw(train: Train) -> Figure:
             f" filters; set output.wheel_interval to {1.0 / LEAST_RATE:g} or less and run again"
         )
     figure = new_figure(17.5, f"{train.caption}: wheel forces")
-    axes = figure.subplots(4, 1, sharex=True)
     shown = _Forces(train, samples)
-    shown.plot(axes)
+    vehicle = train.model.wheelset_vehicle
+    widths = (3.0, 1.0) if vehicle[-1] else (1.0,)
+    columns = figure.subplots(4, len(widths), sharex="col", sharey="row", squeeze=False, width_ratios=widths)
+    axes = columns[:, 0]
+    shown.plot(axes, vehicle)
+    if vehicle[-1]:
+        shown.plot_by_vehicle(columns[:, 1], vehicle)
     _limits(axes, train)
     _mark_run_in(axes, train, samples)
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    axes[0].set(ylabel="Q [kN]", title="Vertical force of the wheel on the rail")
-    axes[1].set(ylabel="Y [kN]", title="Lateral force of the wheel on the rail, right positive")
-    axes[2].set(ylabel="ΣY [kN]", title="Lateral force of the wheelset, mean over 2 m")
-    axes[3].set(ylabel="Y/Q [-]", title="Y over Q, outward positive, mean over 2 m")
     axes[3].set_xlabel("chainage of the wheelset [m]")
     return figure
 
 
 class _Forces:
-    """Curves of the leading wheelset and bands of all wheels, filled slice by slice."""
+    """Curves and ranges of all wheelsets and bands of all wheels, filled slice by slice."""
 
     def __init__(self, train: Train, samples: Samples) -> None:
-        self._offset = samples.group["wheelset_offset"][:]
+        self._offset: Reals = samples.group["wheelset_offset"][:]
+        count = len(self._offset)
         begin, end = samples.chainage_range
-        self._limits = (begin + float(self._offset.min()), end + float(self._offset.max()))
+        limits = (begin + float(self._offset.min()), end + float(self._offset.max()))
         self._static = train.static_loads
-        self.bands = [Band(*self._limits, bins_for(len(samples))) for _ in range(2)]
-        lead = (begin + float(self._offset[0]), end + float(self._offset[0]))
-        self.curves = {name: [Curve(*lead), Curve(*lead)] for name in ("Q", "Y", "quotient")}
-        self.axle = Curve(*lead)
+        self.bands = [Band(*limits, bins_for(len(samples))) for _ in range(2)]
+        position = samples.group["position"]
+        settling = math.ceil(low_pass_settling(FORCE_CUT_OFF) / samples.interval)
+        first, last = first_samples(train, samples), max(len(samples) - 1 - settling, 0)
+        self._counted = [(float(position[max(i, settling)]), float(position[last])) if max(i, settling) < last
+                         else (begin, end) for i in map(int, first)]  # fmt: skip
+        kept = count if train.model.wheelset_vehicle[-1] else 1
+        sides = {"Q": 2, "Y": 2, "axle": 1, "quotient": 2}
+        self.curves = {
+            name: [[Curve(begin + x, end + x) for _ in range(n)] for x in map(float, self._offset[:kept])]
+            for name, n in sides.items()
+        }
+        self.ranges = {name: np.tile([np.inf, -np.inf], (kept, 1)) for name in sides}
         for position, raw in samples.slices():
-            self._add_raw(position, raw["vertical_force"], raw["lateral_force"])
-        for count, position, filtered in samples.low_passed(FORCE_CUT_OFF, ahead=MEAN):
-            self._add_filtered(count, position, filtered["vertical_force"], filtered["lateral_force"])
+            for w, offset in enumerate(self._offset):
+                for band, name in zip(self.bands, ("vertical_force", "lateral_force"), strict=True):
+                    band.add(position + offset, 1e-3 * raw[name][:, w])
+        for own, position, filtered in samples.low_passed(FORCE_CUT_OFF, ahead=MEAN):
+            for w in range(kept):
+                Q, Y = filtered["vertical_force"][:, w], filtered["lateral_force"][:, w]
+                self._add(w, own, position + self._offset[w], Q, Y)
 
-    def _add_raw(self, position: Reals, Q: Reals, Y: Reals) -> None:
-        for w, offset in enumerate(self._offset):
-            for band, force in zip(self.bands, (Q, Y), strict=True):
-                band.add(position + offset, 1e-3 * force[:, w])
-
-    def _add_filtered(self, count: int, position: Reals, Q: Reals, Y: Reals) -> None:
+    def _add(self, w: int, count: int, x: Reals, Q: Reals, Y: Reals) -> None:
         """Add filtered forces; the first ``count`` samples belong to the slice, the means also need those beyond."""
-        x, Q, Y = position + self._offset[0], Q[:, 0], Y[:, 0]
-        quotient = OUTWARD * Y / np.maximum(Q, UNLOADED * self._static[0])
+        quotient = OUTWARD * Y / np.maximum(Q, UNLOADED * self._static[w])
         for side in range(2):
-            self.curves["Q"][side].add(x[:count], 1e-3 * Q[:count, side])
-            self.curves["Y"][side].add(x[:count], 1e-3 * Y[:count, side])
+            self._append("Q", w, side, x[:count], 1e-3 * Q[:count, side])
+            self._append("Y", w, side, x[:count], 1e-3 * Y[:count, side])
             if x[-1] - x[0] >= MEAN:
-                self.curves["quotient"][side].add(*sliding_mean(x, quotient[:, side], MEAN))
+                self._append("quotient", w, side, *sliding_mean(x, quotient[:, side], MEAN))
         if x[-1] - x[0] >= MEAN:
-            self.axle.add(*sliding_mean(x, 1e-3 * Y.sum(axis=1), MEAN))
+            self._append("axle", w, 0, *sliding_mean(x, 1e-3 * Y.sum(axis=1), MEAN))
 
-    def plot(self, axes: NDArray[np.object_]) -> None:
+    def _append(self, name: str, w: int, side: int, x: Reals, values: Reals) -> None:
+        self.curves[name][w][side].add(x, values)
+        begin, end = self._counted[w]
+        counted = values[(x >= begin + self._offset[w]) & (x <= end + self._offset[w])]
+        if len(counted):
+            low, high = self.ranges[name][w]
+            self.ranges[name][w] = min(low, counted.min()), max(high, counted.max())
+
+    def worst(self, name: str) -> int:
+        """Wheelset with the largest magnitude after its run-in."""
+        largest = np.abs(np.where(np.isfinite(self.ranges[name]), self.ranges[name], 0.0)).max(axis=1)
+        return int(np.argmax(largest))
+
+    def plot(self, axes: NDArray[np.object_], vehicle: NDArray[np.int32]) -> None:
         """Draw into the four panels."""
         for panel, band in zip(axes[:2], self.bands, strict=True):
             panel.fill_between(
                 band.x, band.low, band.high, color=GREY, linewidth=0.0, label="all wheels, unfiltered", rasterized=True
             )
-        for panel, name in zip((axes[0], axes[1], axes[3]), self.curves, strict=True):
-            for curve, look, side in zip(self.curves[name], (LEFT, RIGHT), ("left", "right"), strict=True):
-                _plot(panel, curve, look, f"leading wheelset {side}{', 20 Hz' if name != 'quotient' else ''}")
-        _plot(axes[2], self.axle, LEFT, "leading wheelset")
+        which = "worst wheelset" if vehicle[-1] else "leading wheelset"
+        for panel, (name, (ordinate, title)) in zip(axes, TITLES.items(), strict=True):
+            w = self.worst(name)
+            for curve, look, side in zip(self.curves[name][w], (LEFT, RIGHT), ("left", "right"), strict=False):
+                filtered = ", 20 Hz" if name in ("Q", "Y") else ""
+                _plot(panel, curve, look, which if name == "axle" else f"{which} {side}{filtered}")
+            panel.set(
+                ylabel=ordinate,
+                title=title if vehicle[-1] == 0 else f"{title}; wheelset {w + 1}, vehicle {vehicle[w] + 1}",
+            )
+
+    def plot_by_vehicle(self, axes: NDArray[np.object_], vehicle: NDArray[np.int32]) -> None:
+        """Draw the range of every wheelset after its run-in over the place of the wheelset in the train."""
+        x = vehicle + 1 + 0.7 * (_rank(vehicle) - 0.5)
+        for panel, (name, ranges) in zip(axes, self.ranges.items(), strict=True):
+            low, high = np.where(np.isfinite(ranges), ranges, np.nan).T
+            w = self.worst(name)
+            for among, colour, width in ((slice(None), "0.45", 1.1), (slice(w, w + 1), BLACK, 2.2)):
+                panel.vlines(x[among], low[among], high[among], color=colour, linewidth=width)
+            panel.set_xlim(0.5, vehicle[-1] + 1.5)
+            panel.set_title("range, by vehicle")
+        axes[3].set_xlabel("vehicle")
+        axes[3].xaxis.get_major_locator().set_params(integer=True)
+
+
+def _rank(vehicle: NDArray[np.int32]) -> Reals:
+    """Place of each wheelset in its vehicle, from 0 for the leading one to 1, shape (n_ws,)."""
+    first = np.searchsorted(vehicle, vehicle)
+    behind = np.arange(len(vehicle)) - first
+    return behind / np.maximum(np.bincount(vehicle)[vehicle] - 1, 1)
 
 
 def _plot(axes: Axes, curve: Curve, look: Look, label: str) -> None:
@@ -138,10 +197,10 @@ def _limits(axes: NDArray[np.object_], train: Train) -> None:
 
 
 def _mark_run_in(axes: NDArray[np.object_], train: Train, samples: Samples) -> None:
-    """Shade the run-in, which the indices leave out."""
-    begin = samples.chainage_range[0] + float(samples.group["wheelset_offset"][0])
+    """Shade the run-in, which the indices leave out; wheels behind the leading one reach it from smooth track."""
+    begin, end = (chainage + float(samples.group["wheelset_offset"][0]) for chainage in samples.chainage_range)
     run_in = train.scenario.output.run_in
     for panel in axes:
-        panel.margins(x=0.0)
+        panel.set_xlim(begin, end)
         if 0.0 < run_in < samples.distance:
             panel.axvspan(begin, begin + run_in, color="0.94", linewidth=0.0, zorder=0, label="run-in")

@@ -42,16 +42,16 @@ def draw(train: Train) -> Figure:
     if not gauges:
         raise AbsentError(f"{train.result.name}: the train reached none of its gauges: {', '.join(all_gauges)}")
     shown = list(gauges.items())[:MOST]
+    passing = "passing vehicles" if train.model.wheelset_vehicle[-1] else "passing wheelsets"
     selection = f", {MOST} of {len(gauges)} gauges" if len(gauges) > MOST else ""
-    figure = new_figure(1.5 + 4.2 * len(shown), f"{train.caption}: gauges{selection}; passing wheelsets in grey")
+    figure = new_figure(1.5 + 4.2 * len(shown), f"{train.caption}: gauges{selection}; {passing} in grey")
     rows = figure.subfigures(len(shown), 1, squeeze=False)[:, 0]
     for row, (name, group) in zip(rows, shown, strict=True):
         row.suptitle(plain(_title(name, group)), x=0.01, ha="left", fontsize=8.0)
         axes = row.subplots(1, 3 if "displacement" in group else 2)
         _history(axes, group)
         for panel in axes:
-            for passing in _passings(group, train.scenario.parts.wheelset_positions):
-                panel.axvline(passing, color="0.75", linewidth=0.6, zorder=0)
+            _mark_passings(panel, group, train)
             panel.margins(x=0.0)
             panel.set_xlabel("time [s]")
     figure.legend(
@@ -87,10 +87,17 @@ def _plot(axes: Axes, group: Any, values: Reals, look: Look) -> None:
     axes.plot(*curve.line, rasterized=curve.is_thinned, **look._asdict())
 
 
-def _passings(group: Any, wheelsets: Reals) -> Reals:
-    """Times at which wheelsets are over the gauge [s], shape (passings,)."""
-    position = group["position"][:]
-    centre = float(group.attrs["chainage"]) - wheelsets
-    centre = centre[(centre > position[0]) & (centre < position[-1])]
-    times: Reals = np.interp(centre, position, group["time"][:])
-    return times
+def _mark_passings(axes: Axes, group: Any, train: Train) -> None:
+    """Mark when wheelsets are over the gauge; of several vehicles, the time from the first to the last wheelset."""
+    position: Reals = group["position"][:]
+    centre: Reals = float(group.attrs["chainage"]) - train.scenario.parts.wheelset_positions
+    vehicle = train.model.wheelset_vehicle
+    passed = (centre > position[0]) & (centre < position[-1])
+    times = np.interp(centre, position, group["time"][:])
+    if not vehicle[-1]:
+        for passing in times[passed]:
+            axes.axvline(passing, color="0.75", linewidth=0.6, zorder=0)
+        return
+    for number in np.unique(vehicle[passed]):
+        own = times[vehicle == number]
+        axes.axvspan(own.min(), own.max(), color="0.92", linewidth=0.0, zorder=0)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["draw", "largest_by_stretch"]
 
 MOST_ROWS = 400  # of a picture
+MOST_LARGE_MARKS = 12  # wheelsets; the marks of longer trains would touch each other
 SLICE = 200  # snapshots in memory at a time
 COLOURS = "cividis"  # monotonic lightness: readable in grey and with colour vision deficiency
 
@@ -57,7 +58,8 @@ def draw(train: Train) -> Figure:
         axes[0, side].set(title=f"{SIDES[side].capitalize()}: median, band of 5 to 95 %")
         axes[2, side].set_xlabel("ahead of the first vehicle's centre [m]")
         for panel in axes[:, side]:
-            panel.plot(wheels, np.ones(len(wheels)), "v", color=BLACK, markersize=3, clip_on=False,
+            size = 3.0 if len(wheels) <= MOST_LARGE_MARKS else 1.5
+            panel.plot(wheels, np.ones(len(wheels)), "v", color=BLACK, markersize=size, clip_on=False,
                        transform=panel.get_xaxis_transform())  # fmt: skip
             panel.margins(x=0.0)
     axes[0, 1].sharey(axes[0, 0])

@@ -20,7 +20,7 @@ import numpy as np
 
 from tiengine.indices.filters import block_rms, weighted
 from tiengine.indices.index import Index, worst_of
-from tiengine.indices.ride import FloorPoint, Ride
+from tiengine.indices.ride import FloorPoint, Ride, Times
 from tiengine.parameters.arrays import Reals
 
 __all__ = ["en12299_indices", "iso2631_indices", "mean_comfort", "total_rms"]
@@ -66,8 +66,8 @@ def _floor(ride: Ride, vehicle: int) -> list[FloorPoint]:
 
 
 def _mean_comfort_at(ride: Ride, vehicle: int, point: FloorPoint) -> Index:
-    times = ride.acceleration_times
-    y, z = (block_rms(series, times.interval, BLOCK) for series in _weighted(ride, point, "Wb"))
+    times = ride.acceleration_times(vehicle)
+    y, z = (block_rms(series, times.interval, BLOCK) for series in _weighted(times, point, "Wb"))
     value = mean_comfort(y, z) if len(y) else None
     return Index(
         standard=EN,
@@ -84,8 +84,8 @@ def _mean_comfort_at(ride: Ride, vehicle: int, point: FloorPoint) -> Index:
 
 
 def _rms_at(ride: Ride, vehicle: int, point: FloorPoint) -> Index:
-    duration = ride.acceleration_times.duration()
-    value = total_rms(*_weighted(ride, point, "Wk"))
+    times = ride.acceleration_times(vehicle)
+    duration, value = times.duration(), total_rms(*_weighted(times, point, "Wk"))
     return Index(
         standard=ISO,
         name="weighted rms, total",
@@ -100,9 +100,8 @@ def _rms_at(ride: Ride, vehicle: int, point: FloorPoint) -> Index:
     )
 
 
-def _weighted(ride: Ride, point: FloorPoint, vertical: str) -> tuple[Reals, Reals]:
+def _weighted(times: Times, point: FloorPoint, vertical: str) -> tuple[Reals, Reals]:
     """Weighted lateral and vertical acceleration after the run-in [m/s^2], shape (n,) each."""
-    times = ride.acceleration_times
     y = weighted(point.acceleration["lateral"], times.interval, "Wd")
     z = weighted(point.acceleration["vertical"], times.interval, vertical)
     return y[times.used()], z[times.used()]

@@ -127,7 +127,7 @@ def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
 
 def _wheelset_indices(ride: Ride, vehicle: int, wheelset: int) -> Iterator[Index]:
     forces, speed, vehicle_class = ride.forces(wheelset), ride.speed, ride.vehicle_classes[vehicle]
-    reason = _shortfall(ride, forces.position)
+    reason = _shortfall(ride, vehicle, forces.position)
 
     def index(name: str, place: str, value: float, unit: str, limit: float | None, clause: str) -> Index:
         place = f"wheelset {wheelset + 1}{place}"
@@ -158,7 +158,7 @@ def body_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
 
 
 def _acceleration_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Direction) -> Index:
-    times, vehicle_class = ride.acceleration_times, ride.vehicle_classes[vehicle]
+    times, vehicle_class = ride.acceleration_times(vehicle), ride.vehicle_classes[vehicle]
     limit = ACCELERATION_LIMITS.get(vehicle_class)
     settling = band_pass_settling(*BAND)
     position = times.position[times.used(settling)]
@@ -178,12 +178,12 @@ def _acceleration_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Dir
         unit="m/s^2",
         limit=limit,
         clause="7.5.4 ride characteristics",
-        shortfall=_shortfall(ride, position),
+        shortfall=_shortfall(ride, vehicle, position),
         note=note,
     )
 
 
-def _shortfall(ride: Ride, position: Reals) -> str:
-    """Shortfall of the run, or of the chainages that the settling of filters leaves of it [m], shape (n,)."""
+def _shortfall(ride: Ride, vehicle: int, position: Reals) -> str:
+    """Shortfall of a vehicle's distance, or of the chainages [m] that the settling of filters leaves, shape (n,)."""
     used = float(position[-1] - position[0]) if len(position) else 0.0
-    return shortfall(ride.distance, ride.speed) or shortfall(used, ride.speed)
+    return shortfall(ride.distance(vehicle), ride.speed) or shortfall(used, ride.speed)

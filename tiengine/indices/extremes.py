@@ -111,7 +111,8 @@ def read_extremes(train: Train, name: str, key: str) -> Extremes:
     reached = (chainage >= low) & (chainage <= high)
     passed = (chainage >= begin) & (chainage <= end)
     counted = passed & (chainage >= begin + train.scenario.output.run_in)
-    counted = counted if counted.any() else passed if passed.any() else reached
+    ahead = reached & (chainage >= begin)  # of the leading wheel's start: a long train may pass none with all wheels
+    counted = next((rows for rows in (counted, passed, ahead) if rows.any()), reached)
     return Extremes(
         index=group[name.removesuffix("s")][:].astype(np.int64),
         chainage=chainage,

@@ -160,7 +160,7 @@ def body_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
 
 
 def _sperling_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Direction) -> Index:
-    times = ride.acceleration_times
+    times = ride.acceleration_times(vehicle)
     value = sperling(point.acceleration[direction][times.used()], times.interval, direction)
     classes = SPERLING_CLASSES.get(ride.vehicle_classes[vehicle], ())
     if value is None:
@@ -173,7 +173,7 @@ def _sperling_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Directi
 
 
 def _acceleration_at(ride: Ride, vehicle: int, point: FloorPoint, direction: Direction) -> Index:
-    times, settling = ride.acceleration_times, band_pass_settling(*ACCELERATION_BAND)
+    times, settling = ride.acceleration_times(vehicle), band_pass_settling(*ACCELERATION_BAND)
     value, note = None, f"run shorter than a period of 0.5 Hz, 2 s, and {2.0 * settling:g} s of settling of the filter"
     if times.duration(settling) * ACCELERATION_BAND[0] >= 1.0:
         series = band_pass(point.acceleration[direction], times.interval, *ACCELERATION_BAND)
@@ -187,7 +187,7 @@ def _index(
     ride: Ride, vehicle: int, name: str, place: str, value: float | None, unit: str, limit: float | None,
     clause: str, note: str = "",
 ) -> Index:  # fmt: skip
-    reason = f"largest value over {ride.distance:.0f} m instead of the statistics over sections of app. D"
+    reason = f"largest value over {ride.distance(vehicle):.0f} m instead of the statistics over sections of app. D"
     if limit is None and not note:
         note = no_limit(ride.vehicle_classes[vehicle])
     return Index(

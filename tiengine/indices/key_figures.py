@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tiengine.indices.extremes import Extremes, read_extremes
-from tiengine.indices.train_record import AbsentError, Samples, Train
+from tiengine.indices.train_record import AbsentError, Train
+from tiengine.indices.wheel_extremes import ForceExtreme, WheelExtremes, wheel_extremes
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.conventions import SIDES
 
@@ -85,48 +87,23 @@ def summarise(trains: Sequence[tuple[int, Sequence[KeyFigure]]]) -> list[Summary
     return summaries
 
 
-@dataclass
-class _Extreme:
-    """Largest (sign 1) or smallest (sign -1) value of a channel over all wheels, found slice by slice."""
-
-    sign: float
-    value: float = -np.inf
-    where: str = ""
-
-    def update(self, values: Reals, position: Reals, offset: Reals) -> None:
-        """Add samples [N], shape (n, wheelsets, 2), at positions [m], shape (n,)."""
-        i, w, side = np.unravel_index(int(np.argmax(self.sign * values)), values.shape)
-        if self.sign * values[i, w, side] > self.value:
-            self.value = float(self.sign * values[i, w, side])
-            self.where = f"wheelset {w + 1} {SIDES[side]}, chainage {position[i] + offset[w]:.1f} m"
-
-    def figure(self, name: str, *, smallest: bool = False) -> KeyFigure:
-        return KeyFigure(name, 1e-3 * self.sign * self.value, "kN", self.where, smallest)
-
-
 def _wheels(train: Train) -> Iterator[KeyFigure]:
-    samples = train.samples("wheel", "vertical_force", "lateral_force")
-    offset: Reals = samples.group["wheelset_offset"][:]
-    largest, smallest, lateral = _Extreme(1.0), _Extreme(-1.0), _Extreme(1.0)
-    lifted = np.zeros((len(offset), 2))
-    for position, channels in samples.slices(_begin(train, samples)):
-        Q, Y = channels["vertical_force"], np.abs(channels["lateral_force"])
-        largest.update(Q, position, offset)
-        smallest.update(Q, position, offset)
-        lateral.update(Y, position, offset)
-        lifted += (Q <= 0.0).sum(axis=0)
-    yield largest.figure("largest vertical wheel force Q")
-    yield smallest.figure("smallest vertical wheel force Q", smallest=True)
-    yield lateral.figure("largest lateral wheel force |Y|")
-    w, side = np.unravel_index(int(np.argmax(lifted)), lifted.shape)
-    where = f"wheelset {w + 1} {SIDES[side]}" if lifted.any() else ""
-    yield KeyFigure("longest time of a wheel off the rail", 1e3 * float(lifted.max()) * samples.interval, "ms", where)
+    found = wheel_extremes(train)
+    yield _at_wheel(found, found.largest, "largest vertical wheel force Q", np.nanargmax)
+    yield _at_wheel(found, found.smallest, "smallest vertical wheel force Q", np.nanargmin, smallest=True)
+    yield _at_wheel(found, found.lateral, "largest lateral wheel force |Y|", np.nanargmax)
+    w, side = divmod(int(np.argmax(found.time_off)), 2)
+    where = found.place(w, side) if found.time_off.any() else ""
+    yield KeyFigure("longest time of a wheel off the rail", 1e3 * float(found.time_off.max()), "ms", where)
 
 
-def _begin(train: Train, samples: Samples) -> int:
-    """First sample after the run-in, or the first of all if the run ends before."""
-    begin = samples.after(train.scenario.output.run_in)
-    return begin if begin < len(samples) else 0
+def _at_wheel(
+    found: WheelExtremes, extreme: ForceExtreme, name: str, worst: Callable[[Reals], Any], *, smallest: bool = False
+) -> KeyFigure:
+    """Worst of all wheels [kN] and its place."""
+    w, side = divmod(int(worst(extreme.value)), 2)
+    where = f"{found.place(w, side)}, chainage {extreme.chainage[w, side]:.1f} m"
+    return KeyFigure(name, 1e-3 * float(extreme.value[w, side]), "kN", where, smallest)
 
 
 def _seats(train: Train) -> Iterator[KeyFigure]:

@@ -9,7 +9,7 @@ from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from tiengine.indices import comfort, en14363, gb5599
-from tiengine.indices.index import Index
+from tiengine.indices.index import Index, worst
 from tiengine.indices.recorded_ride import RecordedRide
 from tiengine.indices.ride import Ride
 from tiengine.parameters.errors import InputError
@@ -40,11 +40,13 @@ class TrainMetrics:
         train: Number in the file.
         distance: Distance evaluated, without the run-in [m].
         indices: Indices, vehicle by vehicle.
+        left_out: Numbers of the vehicles that the run is too short for, 1 for the leading one.
     """
 
     train: int
     distance: float
     indices: tuple[Index, ...]
+    left_out: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -80,13 +82,23 @@ class Metrics:
     trains: tuple[TrainMetrics, ...]
     failed: dict[int, str]
 
-    def spread(self) -> tuple[Spread, ...]:
-        """Collect every index over all trains, vehicle by vehicle of the train."""
-        groups: dict[tuple[str, str, int], list[tuple[int, Index]]] = {}
+    def spread(self, *, by_vehicle: bool = True) -> tuple[Spread, ...]:
+        """Collect every index over all trains.
+
+        Args:
+            by_vehicle: Vehicle by vehicle of the train; otherwise the worst vehicle stands for each train.
+        """
+        groups: dict[tuple[str, str, int], dict[int, list[Index]]] = {}
         for train in self.trains:
             for index in train.indices:
-                groups.setdefault((index.standard, index.name, index.vehicle), []).append((train.train, index))
-        return tuple(map(_spread, groups.values()))
+                key = (index.standard, index.name, index.vehicle if by_vehicle else 0)
+                groups.setdefault(key, {}).setdefault(train.train, []).append(index)
+        return tuple(_spread([(i, worst(found)) for i, found in trains.items()]) for trains in groups.values())
+
+    @property
+    def vehicles(self) -> int:
+        """Number of vehicles, with those left out."""
+        return max(max((*(i.vehicle for i in t.indices), *t.left_out), default=1) for t in self.trains)
 
     def to_json(self) -> str:
         """Return JSON text with a format version."""
@@ -95,7 +107,12 @@ class Metrics:
             "format_version": FORMAT_VERSION,
             "file": self.name,
             "trains": [
-                {"train": t.train, "way_m": t.distance, "indices": [index.to_dict() for index in t.indices]}
+                {
+                    "train": t.train,
+                    "way_m": t.distance,
+                    "vehicles_left_out": list(t.left_out),
+                    "indices": [index.to_dict() for index in t.indices],
+                }
                 for t in self.trains
             ],
             "failed": {str(train): why for train, why in self.failed.items()},
@@ -135,7 +152,9 @@ def train_metrics(ride: Ride, train: int = 0) -> TrainMetrics:
         train: Number of the train.
     """
     vehicles = range(len(ride.vehicle_classes))
-    return TrainMetrics(train, ride.distance, tuple(x for v in vehicles for method in METHODS for x in method(ride, v)))
+    evaluated = [v for v in vehicles if ride.is_long_enough(v)]
+    indices = tuple(index for v in evaluated for method in METHODS for index in method(ride, v))
+    return TrainMetrics(train, ride.distance(), indices, tuple(v + 1 for v in vehicles if v not in evaluated))
 
 
 def _spread(entries: Sequence[tuple[int, Index]]) -> Spread:

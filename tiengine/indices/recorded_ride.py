@@ -24,7 +24,7 @@ from tiengine.parameters.errors import InputError
 from tiengine.scenario.recorded import recorded_scenario
 from tiengine.vehicle.connector import VehicleClass
 from tiengine.vehicle.running_gear import Car, RunningGear, cars
-from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
+from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads, wheelset_lag
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Reader
@@ -63,6 +63,7 @@ class RecordedRide(Ride):
         self.where = f"{result.name}: train {train}"
         scenario = scenario or recorded_scenario(result).members[train]
         self._parts, self._class = scenario.parts, vehicle_class
+        self._vehicle_read, self._forces_read = -1, list[Reals]()
         self._wheel = self._group(result[f"trains/{train:03d}"], "wheel", ("lateral_force", "vertical_force"))
         self._body = self._group(result[f"trains/{train:03d}"], "body", ("acceleration",))
         self.speed = scenario.train.speed.fastest
@@ -82,9 +83,22 @@ class RecordedRide(Ride):
         """Return the wheelsets of a vehicle, numbered through the train from 0."""
         return [int(i) for i in np.flatnonzero(self._model.wheelset_vehicle == vehicle)]
 
+    def vehicle_of(self, wheelset: int) -> int:
+        """Return the vehicle of a wheelset; both are numbered from 0."""
+        return int(self._model.wheelset_vehicle[wheelset])
+
+    def lag(self, vehicle: int) -> float:
+        """Return the distance of a vehicle's leading wheelset behind that of the first one [m]."""
+        return float(wheelset_lag(self._model)[self.wheelsets(vehicle)[0]])
+
     def raw_forces(self, wheelset: int) -> tuple[Reals, Reals, Reals]:
         """Read Y and Q of a wheelset [N], shape (n, 2), and its static wheel loads [N], shape (2,)."""
-        Y, Q = (self._wheel[name][:, wheelset, :].astype(np.float64) for name in ("lateral_force", "vertical_force"))
+        vehicle = self.vehicle_of(wheelset)
+        first, last = self.wheelsets(vehicle)[0], self.wheelsets(vehicle)[-1]
+        if vehicle != self._vehicle_read:  # its wheelsets share the chunks of the file
+            self._forces_read = [self._wheel[name][:, first : last + 1] for name in ("lateral_force", "vertical_force")]
+            self._vehicle_read = vehicle
+        Y, Q = (values[:, wheelset - first].astype(np.float64) for values in self._forces_read)
         return Y, Q, self._static[wheelset]
 
     def floor(self, vehicle: int) -> list[FloorPoint]:

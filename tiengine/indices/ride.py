@@ -1,14 +1,16 @@
 """A ride as the standards require it: forces by wheelset, accelerations at floor points.
 
-Run-in and the ends at which filters settle are left out. Derived classes know where the signals come from: a result
-file (:mod:`tiengine.indices.recorded_ride`) or a table of measured signals (:mod:`tiengine.indices.measured_ride`).
+Run-in and the ends at which filters settle are left out. A vehicle behind the first one leaves its run-in where the
+first one did, so that all vehicles are evaluated from the same chainage on. Derived classes know where the signals come
+from: a result file (:mod:`tiengine.indices.recorded_ride`) or a table of measured signals
+(:mod:`tiengine.indices.measured_ride`).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -19,7 +21,7 @@ from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.vehicle.connector import VehicleClass
 
-__all__ = ["FORCE_CUT_OFF", "Direction", "FloorPoint", "Forces", "Ride", "Times", "even_interval"]
+__all__ = ["FORCE_CUT_OFF", "LEAST_DISTANCE", "Direction", "FloorPoint", "Forces", "Ride", "Times", "even_interval"]
 
 Direction = Literal["lateral", "vertical"]
 
@@ -126,22 +128,36 @@ class Ride(ABC):
     def floor(self, vehicle: int) -> list[FloorPoint]:
         """Return the accelerations of a vehicle's floor points."""
 
-    @property
-    def acceleration_times(self) -> Times:
-        """Sampling of the accelerations, which a ride with floor points has."""
-        assert self.body_times is not None, "a ride without accelerations has no floor points"
-        return self.body_times
+    def vehicle_of(self, wheelset: int) -> int:
+        """Return the vehicle of a wheelset; both are numbered from 0."""
+        return 0
 
-    @property
-    def distance(self) -> float:
-        """Distance after the run-in [m]."""
+    def lag(self, vehicle: int) -> float:
+        """Return the distance of a vehicle behind the first one [m]."""
+        return 0.0
+
+    def acceleration_times(self, vehicle: int) -> Times:
+        """Return the sampling of a vehicle's accelerations, which a ride with floor points has."""
+        assert self.body_times is not None, "a ride without accelerations has no floor points"
+        return self._from_same_chainage(self.body_times, vehicle)
+
+    def distance(self, vehicle: int = 0) -> float:
+        """Return the distance that a vehicle covers after its run-in [m]."""
         times = self.body_times or self.wheel_times
-        return float(times.position[-1] - times.position[0]) - times.run_in if times else 0.0
+        return float(times.position[-1] - times.position[0]) - times.run_in - self.lag(vehicle) if times else 0.0
+
+    def is_long_enough(self, vehicle: int) -> bool:
+        """Whether a vehicle covers enough distance after its run-in for any index."""
+        filtered = np.array([0.0, MEAN])
+        if self.wheel_times:
+            times = self._from_same_chainage(self.wheel_times, vehicle)
+            filtered = times.position[times.used(low_pass_settling(FORCE_CUT_OFF))]
+        return self.distance(vehicle) >= LEAST_DISTANCE and len(filtered) > 0 and filtered[-1] - filtered[0] >= MEAN
 
     def forces(self, wheelset: int) -> Forces:
         """Filter the forces of one wheelset."""
-        times = self.wheel_times
-        assert times is not None, "a ride without wheel forces has no wheelsets"
+        assert self.wheel_times is not None, "a ride without wheel forces has no wheelsets"
+        times = self._from_same_chainage(self.wheel_times, self.vehicle_of(wheelset))
         *raw, static = self.raw_forces(wheelset)
         keep = times.used(low_pass_settling(FORCE_CUT_OFF))
         Y, Q = (low_pass(series, times.interval, FORCE_CUT_OFF)[keep] for series in raw)
@@ -153,19 +169,19 @@ class Ride(ABC):
         Raises:
             InputError: The distance after the run-in is too short.
         """
-        settling = low_pass_settling(FORCE_CUT_OFF)
-        filtered = (
-            self.wheel_times.position[self.wheel_times.used(settling)] if self.wheel_times else np.array([0.0, MEAN])
-        )
-        if self.distance >= LEAST_DISTANCE and len(filtered) and filtered[-1] - filtered[0] >= MEAN:
+        if self.is_long_enough(0):
             return
         times = self.body_times or self.wheel_times
         length = float(times.position[-1] - times.position[0]) if times else 0.0
         run_in = times.run_in if times else 0.0
         raise InputError(
             f"{self.where}: {length:.4g} m are too short: output.run_in = {run_in:g} must leave {LEAST_DISTANCE:g} m,"
-            f" and {MEAN:g} m without {settling:g} s at either end"
+            f" and {MEAN:g} m without {low_pass_settling(FORCE_CUT_OFF):g} s at either end"
         )
+
+    def _from_same_chainage(self, times: Times, vehicle: int) -> Times:
+        """Lengthen the run-in by the distance of a vehicle behind the first one."""
+        return replace(times, run_in=times.run_in + self.lag(vehicle))
 
 
 def even_interval(time: Reals, where: str) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +14,7 @@ from tiengine.indices.filters import low_pass
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.recorded import recorded_scenario
-from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
+from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads, wheelset_lag
 
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Reader
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 
 __all__ = ["AbsentError", "Samples", "Train"]
 
-SLICE = 2**15  # samples read at a time
+SLICE = 2**15  # samples of one coach read at a time
+SHORTEST_SLICE = 2**13  # of longer trains: several times what a filter needs beyond either end
+COACH_VALUES = 8  # wheels of one coach
 SETTLING = 10.0  # periods of the cut-off by which a slice is extended for its filter, which decays within one
 
 
@@ -62,6 +65,12 @@ class Samples:
         return int(self.group["time"].shape[0])
 
     @property
+    def slice_length(self) -> int:
+        """Number of samples read at a time; fewer for long trains, so that the memory is that of one coach."""
+        width = max(math.prod(self.group[name].shape[1:]) for name in self._channels)
+        return int(np.clip(SLICE * COACH_VALUES // width, SHORTEST_SLICE, SLICE))
+
+    @property
     def interval(self) -> float:
         """Time between samples [s]."""
         time = self.group["time"]
@@ -98,8 +107,8 @@ class Samples:
     def slices(self, begin: int = 0, end: int | None = None) -> Iterator[tuple[Reals, dict[str, Reals]]]:
         """Yield positions [m], shape (n,), and channels, shape (n, ...), of a range of samples, slice by slice."""
         end = len(self) if end is None else end
-        for start in range(begin, end, SLICE):
-            yield self.read(start, min(start + SLICE, end))
+        for start in range(begin, end, self.slice_length):
+            yield self.read(start, min(start + self.slice_length, end))
 
     def low_passed(self, cut_off: float, ahead: float = 0.0) -> Iterator[tuple[int, Reals, dict[str, Reals]]]:
         """Apply a low pass to the channels, slice by slice, with the same result as in one piece.
@@ -112,8 +121,8 @@ class Samples:
             Number of samples without those ahead, positions [m], shape (n,), and channels, shape (n, ...).
         """
         margin = int(np.ceil(SETTLING / cut_off / self.interval))
-        for start in range(0, len(self), SLICE):
-            end = min(start + SLICE, len(self))
+        for start in range(0, len(self), self.slice_length):
+            end = min(start + self.slice_length, len(self))
             reach = self.at(float(self.group["position"][end - 1]) + ahead) + 1 if ahead else end
             first, last = max(start - margin, 0), min(reach + margin, len(self))
             position, channels = self.read(first, last)
@@ -121,9 +130,16 @@ class Samples:
             filtered = {name: low_pass(values, self.interval, cut_off)[kept] for name, values in channels.items()}
             yield end - start, position[kept], filtered
 
-    def read(self, start: int, end: int) -> tuple[Reals, dict[str, Reals]]:
-        """Read positions [m] and channels of the samples from ``start`` up to ``end``, in double precision."""
-        channels = {name: self.group[name][start:end].astype(np.float64) for name in self._channels}
+    def read(self, start: int, end: int, columns: slice | None = None) -> tuple[Reals, dict[str, Reals]]:
+        """Read positions [m] and channels of the samples from ``start`` up to ``end``, in double precision.
+
+        Args:
+            start: First sample.
+            end: Sample after the last one.
+            columns: Wheelsets or bodies to be read; all if None.
+        """
+        part = (slice(start, end),) if columns is None else (slice(start, end), columns)
+        channels = {name: self.group[name][part].astype(np.float64) for name in self._channels}
         return np.asarray(self.group["position"][start:end]), channels
 
 
@@ -164,6 +180,11 @@ class Train:
         """Static wheel loads [N], shape (wheelsets, 2)."""
         loads: Reals = static_wheel_loads(self.model)
         return loads
+
+    @cached_property
+    def wheelset_lag(self) -> Reals:
+        """Distance of each wheelset's vehicle behind the first one [m], shape (wheelsets,)."""
+        return wheelset_lag(self.model)
 
     def samples(self, name: str, *channels: str) -> Samples:
         """Return a group sampled over time.

@@ -59,6 +59,10 @@ class Deflection:
         """Name of its stage of the step."""
         return "deflection"
 
+    def due(self) -> bool:
+        """Whether a snapshot is taken after the present step, which is not yet counted."""
+        return (self.steps + 1) % self.every == 0
+
     def watch(self) -> None:
         """Take a snapshot if it is time for one."""
         self.steps += 1

@@ -159,6 +159,10 @@ class GaugeSamples:
         """Name of its stage of the step."""
         return "gauges"
 
+    def due(self) -> bool:
+        """Whether the present step records the wheels."""
+        return self.stepper.rows.wheel >= 0
+
     def watch(self) -> None:
         """Read, if the step records the wheels."""
         step, row, _ = self.stepper.rows

@@ -1,7 +1,8 @@
 """Guards: check every millisecond of simulated time whether a train derails or its numbers run away.
 
-Numbers that run away end a train. A derailment, a flange that climbs, a wheel that stays off its rail and a measured
-track that ends are events: they go into the file and onto the screen, and the scenario says whether they end the train.
+Numbers that run away end a train. A derailment, a flange that climbs, a wheel that stays off its rail, forces that
+oscillate at the step's own frequency and a measured track that ends are events: they go into the file and onto the
+screen, and the scenario says whether they end the train.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ from tiengine.engine.state import PARTS
 from tiengine.engine.stepper import Stepper
 from tiengine.kernels import layout as at
 from tiengine.parameters.conventions import SIDES
+from tiengine.recording.step_oscillation import StepOscillation
 from tiengine.result_files.channels import DOFS
 from tiengine.result_files.events import EVENT_KINDS, Event
 from tiengine.scenario.event_policy import Events
+from tiengine.vehicle.train import static_wheel_loads
 
 __all__ = ["Guard", "Watch"]
 
@@ -44,17 +47,24 @@ class Watch:
         lifted: How long each wheel has carried nothing [s], shape (B, W, 2).
         last: Time at which each kind of event was last found at a wheel [s], shape (kinds, B, W, 2).
         ended: Whether the end of the measured track was passed, shape (B,).
+        oscillation: Of the forces at the step's own frequency.
     """
 
     lifted: NDArray[np.float64]
     last: NDArray[np.float64]
     ended: NDArray[np.bool_]
+    oscillation: StepOscillation
 
     @classmethod
     def fresh(cls, trains: int, wheelsets: int) -> Watch:
         """Memory before the first check."""
         wheels = (trains, wheelsets, 2)
-        return cls(np.zeros(wheels), np.full((3, *wheels), -np.inf), np.zeros(trains, dtype=np.bool_))
+        return cls(
+            lifted=np.zeros(wheels),
+            last=np.full((4, *wheels), -np.inf),
+            ended=np.zeros(trains, dtype=np.bool_),
+            oscillation=StepOscillation.none(trains, wheelsets),
+        )
 
 
 @dataclass(eq=False)
@@ -88,7 +98,7 @@ class Guard:
         """
         trains, wheelsets, _ = stepper.state.normal_force.shape
         guard = cls(stepper, policy, track_end, Watch.fresh(trains, wheelsets))
-        stepper.watch("guards", guard.watch_step)
+        stepper.watch("guards", guard.watch_step, due=guard.due)
         return guard
 
     def __post_init__(self) -> None:
@@ -98,7 +108,10 @@ class Guard:
         self._done, self._position = 0, np.zeros(0)
         self._flying = True  # until checked: a checkpoint may have brought wheels in flight
         self.every = max(int(EVERY / self._dt + 1e-9), 1)
+        self._look_every = StepOscillation.interval(self._dt)
         self._shift, self._normal = self.state.relative_shift, self.state.normal_force
+        self._vertical_lateral = self.state.forces_on_rails[..., :2]
+        self._static_load = float(static_wheel_loads(self._train).max())
         table = ingredients.contact
         self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
         self._wheel_front = float(self._train.wheelset_x.max())
@@ -117,8 +130,18 @@ class Guard:
         """Check at the end of a step if it is time to, and after the last of a chunk."""
         i = self.stepper.rows.step
         step = self._done + i + 1
-        if step % self.every == 0 or i + 1 == len(self._position):
+        if self.watch.oscillation.sample(step, self._look_every, self._vertical_lateral):
+            self._oscillates(step, step * self._dt, float(self._position[i]))
+        if self._check_due(i):
             self.check(step, float(self._position[i]))
+
+    def due(self) -> bool:
+        """Whether the present step is checked, or its forces are looked at."""
+        i = self.stepper.rows.step
+        return self._check_due(i) or self.watch.oscillation.due(self._done + i + 1, self._look_every)
+
+    def _check_due(self, i: int) -> bool:
+        return (self._done + i + 1) % self.every == 0 or i + 1 == len(self._position)
 
     def check(self, step: int, position: float) -> None:
         """Check the state after a step.
@@ -155,6 +178,17 @@ class Guard:
         self._report_wheels(1, climbs, step, time, position, words)
         words = f"derailed: lateral shift beyond {self._derailed * 1e3:.1f} mm on the flange side"
         self._report_wheels(0, self._shift > self._derailed, step, time, position, words)
+
+    def _oscillates(self, step: int, time: float, position: float) -> None:
+        """Report wheels whose forces alternate from step to step."""
+        found, size = self.watch.oscillation.look(self._look_every * self._dt, self._static_load)
+        if not found.any():
+            return
+        words = (
+            f"forces alternate from step to step by {1e-3 * size[found].max():.2g} kN: the step is unstable; try"
+            f" numerics.time_step = {0.5 * self._dt:g} or more passes"
+        )
+        self._report_wheels(3, found, step, time, position, words)
 
     def take(self) -> dict[int, list[Event]]:
         """Events since the last call, by place of the train."""

@@ -60,9 +60,13 @@ class SeatEnvelopes:
         """Name of its stage of the step."""
         return "envelopes"
 
+    def due(self) -> bool:
+        """Whether the seats' extremes are taken after the present step."""
+        return self.stepper.seat_extremes_due
+
     def watch(self) -> None:
-        """Take in the forces of a step."""
-        if not self.stepper.seat_extremes_due:
+        """Take in the forces of the steps since the last time."""
+        if not self.due():
             return
         state = self.stepper.state
         if state.first_seat != self.first_seat:

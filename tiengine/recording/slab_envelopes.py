@@ -124,9 +124,13 @@ class SlabEnvelopes:
         """Name of its stage of the step."""
         return "envelopes"
 
+    def due(self) -> bool:
+        """Whether the present step records the bodies."""
+        return self.stepper.rows.body >= 0
+
     def watch(self) -> None:
         """Take in the slabs' shape if the step records the bodies."""
-        if self.stepper.rows.body < 0:
+        if not self.due():
             return
         state = self.stepper.state
         first, motion = state.first_slab, state.slab_motion(DISPLACEMENT)

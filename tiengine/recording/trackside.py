@@ -38,6 +38,9 @@ class Watcher(Protocol):
     def watch(self) -> None:
         """Read the state at the end of a step."""
 
+    def due(self) -> bool:
+        """Whether :meth:`watch` will read the state after the present step."""
+
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
         """Hand over what is complete, train by train.
 
@@ -82,7 +85,7 @@ class Trackside:
         """
         watchers = dict(_watchers(scenario, stepper))
         for watcher in watchers.values():
-            stepper.watch(watcher.stage, watcher.watch)
+            stepper.watch(watcher.stage, watcher.watch, due=watcher.due)
         snapshots = watchers.get("deflection")
         offset = snapshots.point_offset if isinstance(snapshots, Deflection) else np.zeros(0)
         return cls(watchers, offset, stepper.state.trains, DTYPES[scenario.output.precision])

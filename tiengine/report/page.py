@@ -16,12 +16,14 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 import tiengine
 from tiengine.figures.catalogue import KINDS
 from tiengine.figures.style import png
+from tiengine.indices.by_car import Column, by_car
 from tiengine.indices.index import Index
 from tiengine.indices.key_figures import key_figures, summarise
-from tiengine.indices.metrics import Metrics
+from tiengine.indices.metrics import Metrics, Spread
 from tiengine.indices.train_record import AbsentError, Train
+from tiengine.indices.wheel_extremes import wheel_extremes
 from tiengine.parameters.errors import InputError
-from tiengine.report.metrics_table import notes
+from tiengine.report.metrics_table import notes, place
 from tiengine.report.scenario_words import scenario_words
 from tiengine.result_files.output_file import check_output
 from tiengine.result_files.reader import COMPLETE
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["render", "write"]
 
 MOST = 100  # rows of failures, and of events
+MOST_NAMES = 20  # indices over their limit that are named
 
 
 @dataclass(frozen=True)
@@ -124,24 +127,37 @@ def _notice(result: Result) -> str:
 
 
 def _indices(result: Result) -> dict[str, Any]:
-    """Indices by standard and vehicle, their notes, and an overall verdict."""
+    """Worst indices by standard, those by vehicle, their notes, and an overall verdict."""
+    complete = [i for i in range(result.trains) if result.status(i) == COMPLETE]
+    vehicles = len(result.scenario.train.vehicles)
     try:
         metrics = result.metrics()
     except InputError as error:
-        return {"indices": [], "notes": [], "verdict": None, "no_indices": str(error)}
-    spread = metrics.spread()
+        columns = _by_car(vehicles, result, complete, ())
+        return {"indices": [], "notes": [], "verdict": None, "no_indices": str(error), "cars": columns}
     groups: dict[str, list[Any]] = {}
-    vehicles = {each.worst.vehicle for each in spread}
-    for each in spread:
-        vehicle = f"vehicle {each.worst.vehicle}, " if len(vehicles) > 1 else ""
-        groups.setdefault(f"{vehicle}{each.worst.standard}", []).append(each)
-    indices = [each.worst for each in spread]
+    worst = metrics.spread(by_vehicle=False)
+    for each in worst:
+        groups.setdefault(each.worst.standard, []).append((place(each.worst, metrics), each))
+    indices = [each.worst for each in metrics.spread()]
     return {
         "indices": list(groups.items()),
-        "notes": notes(indices, metrics),
+        "notes": notes([each.worst for each in worst], metrics),
         "verdict": _overall_verdict(indices, metrics),
         "no_indices": "",
+        "cars": _by_car(vehicles, result, complete, metrics.spread()),
     }
+
+
+def _by_car(vehicles: int, result: Result, trains: Sequence[int], spread: Sequence[Spread]) -> list[Column]:
+    """Columns of the table by vehicle; none for a single vehicle."""
+    if vehicles == 1:
+        return []
+    try:
+        extremes = [wheel_extremes(Train(result, i)) for i in trains]
+    except AbsentError:
+        extremes = []
+    return by_car(vehicles, spread, extremes)
 
 
 def _overall_verdict(indices: Sequence[Index], metrics: Metrics) -> dict[str, Any]:
@@ -151,8 +167,9 @@ def _overall_verdict(indices: Sequence[Index], metrics: Metrics) -> dict[str, An
     count = f"{len(judged)} of {len(indices)} indices have a value and a limit{worst}"
     if not over:
         return {"over": False, "text": f"{count}: all are within the limit." if judged else f"{count}."}
-    names = "; ".join(f"{index.standard}, {index.name} at {index.place}" for index in over)
-    return {"over": True, "text": f"{count}: {len(over)} over the limit ({names})."}
+    names = [f"{index.standard}, {index.name} at {place(index, metrics)}" for index in over]
+    more = f"; and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return {"over": True, "text": f"{count}: {len(over)} over the limit ({'; '.join(names[:MOST_NAMES])}{more})."}
 
 
 def _pictures(result: Result, train: int) -> tuple[list[_Picture], list[tuple[str, str]]]:
@@ -202,6 +219,7 @@ def _contents(content: dict[str, Any]) -> list[tuple[str, str]]:
     entries = [
         ("scenario", "Scenario"),
         ("numbers", "Key figures"),
+        *([("vehicles", "The train by vehicle")] if content["cars"] else []),
         ("indices", "Indices of the standards"),
         *((f"figure-{picture.name}", picture.title) for picture in content["figures"]),
     ]

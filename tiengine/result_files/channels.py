@@ -64,7 +64,7 @@ MORTAR = {
     "largest_pressure": Channel("Pa", "largest pressure of the mortar under the slab, dead weight included"),
     "smallest_pressure": Channel("Pa", "smallest pressure of the mortar under the slab, dead weight included"),
 }
-"""Of the slabs in the window, each in the slot given by its index modulo the number of slots."""
+"""Channels of the slabs in the window, each in the slot given by its index modulo the number of slots."""
 
 SEATS = {
     "largest_vertical_force": Channel("N", "largest vertical force of the rail on the fastening, positive down"),
@@ -98,13 +98,13 @@ GAUGE_MOTION = {
     "velocity": Channel("m/s", "velocity at the gauge: y right, z down"),
     "acceleration": Channel("m/s^2", "acceleration at the gauge: y right, z down"),
 }
-"""Of a gauge on a rail or a slab."""
+"""Channels of a gauge on a rail or a slab."""
 
 GAUGE_FORCE = {
     "vertical_force": Channel("N", "vertical force of the rail on the fastening, positive down"),
     "lateral_force": Channel("N", "lateral force of the rail on the fastening, positive to the right"),
 }
-"""Of a gauge on a fastening."""
+"""Channels of a gauge on a fastening."""
 
 GROUPS = {
     "wheel": WHEEL,

@@ -25,7 +25,7 @@ __all__ = ["COMPLETE", "FORMAT", "FORMAT_VERSION", "RUNNING", "Reader", "open_fi
 
 FORMAT = "tiengine"
 FORMAT_VERSION = 2
-"""Of the files that are written. In version 1 every train also had a dataset ``time``, that of its group ``wheel``."""
+"""Version of the files that are written. In version 1 a train had a dataset ``time``, that of its group ``wheel``."""
 READABLE_VERSIONS = (1, 2)
 COMPLETE = "complete"
 """Status of a train that has run its whole distance."""

@@ -215,4 +215,11 @@ class Output(Params):
     precision: Annotated[
         Literal["single", "double"], Field(description="floating-point format of the channels in the file")
     ] = "single"
-    run_in: Annotated[float, Q("m", "initial distance excluded from statistics", ge=0)] = 50.0
+    run_in: Annotated[
+        float,
+        Q(
+            "m",
+            "initial distance excluded from statistics; vehicles behind the first one leave it at the same chainage",
+            ge=0,
+        ),
+    ] = 50.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.parameters.errors import InputError
@@ -73,4 +74,8 @@ def restore(run: Run, saved: Checkpoint) -> None:
 
 def _arrays_of(watch: Watch) -> dict[str, NDArray[Any]]:
     """Arrays of the guard's memory, by name."""
-    return {each.name: getattr(watch, each.name) for each in fields(watch)}
+    found: dict[str, NDArray[Any]] = {}
+    for memory in (watch, watch.oscillation):
+        values = {each.name: getattr(memory, each.name) for each in fields(memory)}
+        found |= {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+    return found

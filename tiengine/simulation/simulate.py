@@ -224,6 +224,8 @@ def _groups(scenario: Scenario) -> dict[str, GroupSpec]:
 
 
 def _workers(scenario: Scenario) -> int:
-    """Processes: one per core, divided by the threads of each."""
+    """Processes: one per core, divided by the threads of each; splines use one thread."""
+    numerics = scenario.numerics
+    threads = numerics.threads if numerics.trial_functions == "sines" else 1
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(cores // scenario.numerics.threads, 1)
+    return max(cores // threads, 1)

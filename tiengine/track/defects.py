@@ -18,7 +18,7 @@ from tiengine.parameters.quantity import Params, Q
 from tiengine.track.mortar import MortarVoid, check_void
 from tiengine.track.slab import Slab
 
-__all__ = ["FailedFastenings", "check_defects", "fastening_factors"]
+__all__ = ["FailedFastenings", "check_defects", "fastening_factors", "largest_factor"]
 
 RAILS = {"left": (0,), "right": (1,), "both": (0, 1)}
 
@@ -54,6 +54,17 @@ def fastening_factors(failed: Iterable[FailedFastenings], first: int, count: int
         for side in RAILS[row.rail]:
             factors[max(row.seats[0] - first, 0) : max(row.seats[1] + 1 - first, 0), side] *= row.factor
     return factors
+
+
+def largest_factor(failed: Iterable[FailedFastenings]) -> float:
+    """Largest factor of any fastening, sound ones included; it is found where an entry begins.
+
+    Args:
+        failed: Entries of the scenario.
+    """
+    rows = [row for row in failed if row.factor != 1.0]
+    starts = {row.seats[0] for row in rows if row.factor > 1.0}
+    return max((float(fastening_factors(rows, start, 1).max()) for start in starts), default=1.0)
 
 
 def check_defects(

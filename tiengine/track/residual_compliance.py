@@ -83,7 +83,7 @@ class ResidualCompliance:
 
     @cached_property
     def wheels(self) -> Reals:
-        """Of a wheel under its own force, shape (W, 3)."""
+        """Residual compliance of a wheel under its own force, shape (W, 3)."""
         s = self.wheel_s
         found = []
         for exact, solve in self._fields:
@@ -92,7 +92,7 @@ class ResidualCompliance:
         return np.stack(found, axis=1)
 
     def seats(self, s: Reals) -> Reals:
-        """Of seats under their own force, by their places s [m], shape (k, 3)."""
+        """Residual compliance of seats at s [m] under their own force, shape (k, 3)."""
         offset, weight = seat_points(self.seat_length)
         phi = self.operators.functions.shape(s, over=self.seat_length)
         at = np.clip(np.add.outer(s, offset), 0.0, self.operators.functions.length)
@@ -103,7 +103,7 @@ class ResidualCompliance:
         return np.stack(found, axis=1)
 
     def seats_by_wheels(self, s: Reals) -> Reals:
-        """Of seats at s [m] under a wheel's force, and the other way round, shape (k, W, 3); zero beyond a metre."""
+        """Residual compliance between seats at s [m] and wheels, shape (k, W, 3); zero beyond a metre."""
         offset, weight = seat_points(self.seat_length)
         functions = self.operators.functions
         phi, under = functions.shape(s, over=self.seat_length), functions.shape(self.wheel_s)

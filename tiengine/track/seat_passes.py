@@ -30,7 +30,7 @@ __all__ = ["CONTRACTION", "FACTORS", "SeatPasses", "least_factor"]
 CONTRACTION = 0.9
 """Spectral radius below which two passes a step are trusted to be stable (energy of free vibration, tests)."""
 FACTORS = (1.0, 2.0, 4.0)
-"""Of the smeared seats, the least first: a larger one slows the passes down."""
+"""Factors on the smeared seats, the least first: a larger one slows the passes down."""
 PHASES = 4  # places of the seats in a pitch at which the passes are tried
 ITERATIONS = 60  # of the power method: the modulus of the largest eigenvalue to a few per cent
 

@@ -27,7 +27,15 @@ from tiengine.vehicle.assembly import Assembly, Effort, Element, PlacedBody, lon
 from tiengine.vehicle.connector import extend_table
 from tiengine.vehicle.vehicle import Vehicle
 
-__all__ = ["MOTIONS", "TrainModel", "assemble", "centre_in_window", "static_wheel_loads", "train_centres"]
+__all__ = [
+    "MOTIONS",
+    "TrainModel",
+    "assemble",
+    "centre_in_window",
+    "static_wheel_loads",
+    "train_centres",
+    "wheelset_lag",
+]
 
 MOTIONS = ("y", "z", "roll", "pitch", "yaw")
 """Order of a body's coordinates."""
@@ -237,6 +245,15 @@ def _lay_out(
         row[e, :count] = element.row[used]
         table[e] = extend_table(element.table, points)
     return index, row, table
+
+
+def wheelset_lag(train: TrainModel) -> NDArray[np.float64]:
+    """Return the distance of each vehicle's leading wheelset behind that of the train [m], shape (n_ws,).
+
+    All wheelsets of a vehicle have its distance: what is evaluated by chainage begins for a vehicle this much later.
+    """
+    first = np.searchsorted(train.wheelset_vehicle, train.wheelset_vehicle)
+    return np.asarray(train.wheelset_x[0] - train.wheelset_x[first], np.float64)
 
 
 def static_wheel_loads(train: TrainModel, speed_rate: float = 0.0) -> NDArray[np.float64]:

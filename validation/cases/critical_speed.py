@@ -108,9 +108,9 @@ def hunts(setting: Setting, kmh: float) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "bump.csv"
         write_kick(file, BUMP_START, BUMP_LENGTH, BUMP)
-        way = (f"train.speed_kmh={kmh}", f"train.distance={DURATION * kmh / 3.6}")
+        course = (f"train.speed_kmh={kmh}", f"train.distance={DURATION * kmh / 3.6}")
         bump = (f"irregularity.file={str(file)!r}", "irregularity.taper=1.0")
-        scenario = load_scenario("smooth", [*COARSE, *setting.overrides, *way, *bump])
+        scenario = load_scenario("smooth", [*COARSE, *setting.overrides, *course, *bump])
         try:
             before, last = amplitudes(scenario)
         except RunFailedError:

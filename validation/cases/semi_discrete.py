@@ -129,8 +129,8 @@ class SemiDiscrete:
         return self._contact(t, u[self.dof][None], v[self.dof][None], self.under_wheels(u, v)[None])
 
     def _contact(self, t: float, *motion: NDArray[np.float64]) -> ContactForces:
-        felt = self.track.sample(self.V * t + self.model.ingredients.wheel_s)
-        return evaluate_contact(self.model, self.V, felt, *motion)
+        channels = self.track.sample(self.V * t + self.model.ingredients.wheel_s)
+        return evaluate_contact(self.model, self.V, channels, *motion)
 
     def rhs(self, t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """dy/dt."""

@@ -1,4 +1,4 @@
-"""What a fastening carries upwards, in windows of several lengths: recorded extremes converge as wheel forces do.
+"""Uplift of a fastening in windows of several lengths: recorded extremes converge as wheel forces do.
 
 The rail lifts ahead of the leading wheel and behind the last one, 1.5 to 4 m from them, where the window's pinned
 ends are nearer than to any wheel. References: the same run in a window 12 m beyond the outer wheels.

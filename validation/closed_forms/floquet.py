@@ -29,9 +29,9 @@ seat's damper jumps, and R jumps down by
 
 (the second factor: the jump's own shear waves). The jump at a seat reaches its neighbours as a smaller one.
 
-A seat with a length presses at the points x_n + xi_g, with the shares a_g of its force, and feels the same mean of the
-rail: the load alone moves it by m(omega / V) = sum_g a_g cos(omega xi_g / V) times as much, its neighbours and itself
-by g's mean over both sets of points.
+A seat with a length presses at the points x_n + xi_g, with the shares a_g of its force, and its elongation is the same
+mean of the rail's deflection: the load alone moves it by m(omega / V) = sum_g a_g cos(omega xi_g / V) times as much,
+its neighbours and itself by g's mean over both sets of points.
 
 | here | the engine |
 |---|---|
@@ -137,11 +137,11 @@ def _seat_spectrum(beam: Beam, seats: Seats, V: float, P: float, omega: Complexe
     """R^ [N s]."""
     Z, alone = seats.impedance(omega), P / V * load_transfer(beam, omega / V, omega)
     lag, x, a = omega * seats.pitch / V, np.array(seats.offset), np.array(seats.share)
-    felt = np.tensordot(a, np.cos(np.multiply.outer(x, omega) / V), 1)
+    transfer = np.tensordot(a, np.cos(np.multiply.outer(x, omega) / V), 1)
     apart, which = np.unique(np.subtract.outer(x, x).round(12), return_inverse=True)  # some pairs are as far apart
     weight = np.bincount(which.ravel(), np.outer(a, a).ravel())
     own = sum(b * free_rail(beam, seats, omega, lag, float(y)) for y, b in zip(apart, weight, strict=True))
-    found: Complexes = Z * alone * felt / (1.0 + Z * own)
+    found: Complexes = Z * alone * transfer / (1.0 + Z * own)
     return found
 
 
@@ -160,9 +160,9 @@ def seat_force(beam: Beam, seats: Seats, V: float, P: float, x: Reals) -> Reals:
     """
     omega = _frequencies(V)
     spectrum = _seat_spectrum(beam, seats, V, P, omega) * (-1.0) ** np.arange(POINTS)  # t = 0 in the middle
-    way = (np.arange(POINTS) - POINTS // 2) * (DISTANCE / POINTS)
-    history = (np.fft.ifft(spectrum) * (POINTS * V / DISTANCE)).real * np.exp(DECAY * way)
-    return np.interp(x, way, history)
+    distance = (np.arange(POINTS) - POINTS // 2) * (DISTANCE / POINTS)
+    history = (np.fft.ifft(spectrum) * (POINTS * V / DISTANCE)).real * np.exp(DECAY * distance)
+    return np.interp(x, distance, history)
 
 
 def deflection_under_load(beam: Beam, seats: Seats, V: float, P: float, x: Reals) -> Reals:

@@ -82,8 +82,8 @@ def equivalent_contact(pair: WheelRailPair, table: ContactTable, load: float, am
         return float(2.0 * (values * sine).mean() / amplitude)
 
     at = wheelset_position(pair, amplitude * sine)
-    beside = [wheelset_position(pair, amplitude * sine + step) for step in (nudge, -nudge)]
-    height = [0.5 * (position.right.gap + position.left.gap) for position in beside]  # of the axle, down
+    shifted = [wheelset_position(pair, amplitude * sine + step) for step in (nudge, -nudge)]
+    height = [0.5 * (position.right.gap + position.left.gap) for position in shifted]  # of the axle, down
     centre = dict(zip(table.COLUMNS, table.lookup(0.0, 0.0), strict=True))
     return EquivalentContact(
         conicity=harmonic(0.5 * (at.right.dz_w - at.left.dz_w)),

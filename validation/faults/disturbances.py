@@ -22,13 +22,13 @@ STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
 
 def disturbances(yard: Yard) -> list[Check]:
-    """Of one train."""
+    """Disturb runs of one train."""
     found = [_signalled(yard, number, times, Process.signal) for number in STATUS for times in (1, 2)]
     return [*found, _paused(yard), _two_runs(yard), _two_resumes(yard), _read_meanwhile(yard), _clock_jumps(yard)]
 
 
 def batch_disturbances(yard: Yard) -> list[Check]:
-    """Of trains in two workers."""
+    """Disturb runs of trains in two workers."""
     found = [_signalled(yard, number, 1, Process.signal) for number in STATUS]
     found += [_signalled(yard, number, times, Process.signal_group) for number in STATUS for times in (1, 2)]
     return [*found, _paused(yard), _worker_killed_twice(yard)]

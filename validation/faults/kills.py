@@ -119,8 +119,8 @@ class Yard:
     def clear(self, folder: Path) -> None:
         """Remove a folder and its logs."""
         shutil.rmtree(folder)
-        for beside in self.folder.glob(f"{folder.name}.*"):
-            beside.unlink()
+        for log in self.folder.glob(f"{folder.name}.*"):
+            log.unlink()
 
     def measure(self, how: str) -> tuple[float, float, float]:
         """Instants of an undisturbed run [s]; it must have the same bits."""

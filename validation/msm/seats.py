@@ -5,9 +5,9 @@ discrete sine transform of type III from modes to seats, its transpose (type II)
 ones: i and 2 n - i agree at all seats, i and 2 n + i differ in sign. A product with the n by N matrix of sines would
 read 9 MB; a transform of six rows takes tens of microseconds.
 
-A seat that presses on a length of rail feels the mean of a mode over five Gauss points, symmetric about its middle: the
-mode's value there times the mean of cos k_i xi, for sin k_i (x + xi) = sin k_i x cos k_i xi + an odd part. The factor
-belongs to the mode, not to the seat, and the transform stays.
+For a seat that presses on a length of rail the elongation is the mean of a mode over five Gauss points, symmetric
+about its middle: the mode's value there times the mean of cos k_i xi, for sin k_i (x + xi) = sin k_i x cos k_i xi + an
+odd part. The factor belongs to the mode, not to the seat, and the transform is unchanged.
 """
 
 from __future__ import annotations

@@ -92,17 +92,17 @@ SEVEN_SLABS = ('numerics.slab_count="paper"',)
 def _draw_forces(path: Path, reference: Forces, ours: Forces, direction: str, number: int) -> None:
     """Draw the paper's Fig. 2 or 3: forces of wheelset 1, left and right, both models, and their difference."""
     n = min(len(reference.time), len(ours.time))
-    way = reference.position[:n] - reference.position[0]
+    distance = reference.position[:n] - reference.position[0]
     figure, axes = plt.subplots(4, 1, figsize=(9.0, 9.0), sharex=True, layout="constrained")
     for side, (name, colour) in enumerate((("left", LEFT), ("right", RIGHT))):
         a, b = (1e-3 * getattr(run, direction)[:n, 0, side] for run in (reference, ours))
-        axes[2 * side].plot(way, a, color=MARK, linewidth=1.2, label="full length")
-        axes[2 * side].plot(way, b, color=colour, linewidth=0.5, label="moving window")
+        axes[2 * side].plot(distance, a, color=MARK, linewidth=1.2, label="full length")
+        axes[2 * side].plot(distance, b, color=colour, linewidth=0.5, label="moving window")
         axes[2 * side].set_ylabel(f"{name} wheel [kN]")
         axes[2 * side].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False)
-        metre = np.flatnonzero(np.diff(np.floor(way), prepend=-1.0))
+        metre = np.flatnonzero(np.diff(np.floor(distance), prepend=-1.0))
         largest = np.maximum.reduceat(1e3 * np.abs(a - b), metre)
-        axes[2 * side + 1].semilogy(way[metre], largest, color=colour, linewidth=0.9)
+        axes[2 * side + 1].semilogy(distance[metre], largest, color=colour, linewidth=0.9)
         axes[2 * side + 1].set_ylabel("|difference| [N]\nlargest in 1 m")
     axes[1].sharey(axes[3])
     axes[3].autoscale()
@@ -110,7 +110,7 @@ def _draw_forces(path: Path, reference: Forces, ours: Forces, direction: str, nu
         axis.grid(color="0.9")
         axis.spines[["top", "right"]].set_visible(False)
     axes[-1].set_xlabel("distance [m]")
-    axes[-1].set_xlim(0.0, round(float(way[-1]), -1))
+    axes[-1].set_xlim(0.0, round(float(distance[-1]), -1))
     figure.suptitle(
         f"Fig. {number}: {direction} force of wheelset 1, 60 modes in 36 m against {reference.facts['modes']} in"
         f" {reference.facts['rail_length']:g} m",

@@ -43,15 +43,15 @@ class Case:
 
 
 CASES = {
-    "one_train": Case(("paper", "default"), lambda effort, rounds, tell: one_train(rounds)),
-    "batch": Case(("batch", "batch_one_worker", "batch_threads"), lambda effort, rounds, tell: batch(rounds)),
+    "one_train": Case(("paper", "default"), lambda effort, rounds, notify: one_train(rounds)),
+    "batch": Case(("batch", "batch_one_worker", "batch_threads"), lambda effort, rounds, notify: batch(rounds)),
     "full_length": Case(
-        ("paper", "batch", "full_20", "full_90"), lambda effort, rounds, tell: full_length(effort, rounds)
+        ("paper", "batch", "full_20", "full_90"), lambda effort, rounds, notify: full_length(effort, rounds)
     ),
-    "command": Case((), lambda effort, rounds, tell: command(effort)),
-    "roofline": Case((), lambda effort, rounds, tell: roofline(effort)),
-    "scaling": Case((), lambda effort, rounds, tell: scaling(effort, tell)),
-    "length": Case((), lambda effort, rounds, tell: length(effort, tell)),
+    "command": Case((), lambda effort, rounds, notify: command(effort)),
+    "roofline": Case((), lambda effort, rounds, notify: roofline(effort)),
+    "scaling": Case((), lambda effort, rounds, notify: scaling(effort, notify)),
+    "length": Case((), lambda effort, rounds, notify: length(effort, notify)),
 }
 
 
@@ -89,18 +89,18 @@ def _measure(chosen: Sequence[str], much: Effort, console: Console) -> dict[str,
     start = findings.circumstances(much.name, date)
     clock = time.perf_counter()
 
-    def tell(words: str) -> None:
+    def notify(words: str) -> None:
         console.print(f"{time.perf_counter() - clock:6.0f} s  {words}")
 
     if start.busy:
         console.print(f"[yellow]{busy_words('warning', asdict(start))}[/]")
     runs = tuple(dict.fromkeys(run for name in chosen for run in CASES[name].runs))
-    rounds = in_turn(runs, much.rounds, much.distance, tell)
+    rounds = in_turn(runs, much.rounds, much.distance, notify)
     found = {}
     for name in chosen:
-        tell(name.replace("_", " "))
-        found[name] = {"circumstances": asdict(start), **asdict(CASES[name].measure(much, rounds, tell))}
-    tell("done")
+        notify(name.replace("_", " "))
+        found[name] = {"circumstances": asdict(start), **asdict(CASES[name].measure(much, rounds, notify))}
+    notify("done")
     return found
 
 

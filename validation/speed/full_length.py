@@ -74,13 +74,13 @@ def profile_full_length(slab_modes: int, steps: int) -> dict[str, Any]:
     from tiengine.scenario.scenario import load_scenario
     from validation.msm.simulate import FullLength, load, prepare
 
-    way = 0.8 * RAIL
-    scenario = load_scenario("paper", settings_of(RUNS["paper"], way))
+    distance = 0.8 * RAIL
+    scenario = load_scenario("paper", settings_of(RUNS["paper"], distance))
     numerics = FullLength(RAIL, MODES_PER_METRE, slab_modes, float(scenario.numerics.time_step))
     with threadpool_limits(1):
         stepper = prepare(scenario, numerics, *(WARM_UP + steps,) * 3)
         start = scenario.rear + scenario.centre_in_window
-        load(stepper, scenario, make_irregularity(scenario.irregularity, start + 50.0), start, start + way)
+        load(stepper, scenario, make_irregularity(scenario.irregularity, start + 50.0), start, start + distance)
         spent: Counter[str] = Counter()
         for method, stage in STAGES.items():
             setattr(stepper, method, _timed(getattr(stepper, method), stage, spent))

@@ -11,12 +11,12 @@ from validation.speed.runs import RUNS, apart, perform
 __all__ = ["length"]
 
 
-def length(effort: Effort, tell: Callable[[str], object]) -> Findings:
+def length(effort: Effort, notify: Callable[[str], object]) -> Findings:
     """Run each distance once, each in a process of its own."""
     table = []
     for km in effort.lengths_km:
-        tell(f"{km:g} km")
-        (facts,) = apart(perform, (RUNS["way"], 1e3 * km))
+        notify(f"{km:g} km")
+        (facts,) = apart(perform, (RUNS["kilometres"], 1e3 * km))
         table.append(
             {
                 "length_km": km,

@@ -91,7 +91,7 @@ def perform(run: Run, distance: float) -> Facts:
 
 
 def in_turn(
-    names: Sequence[str], rounds: int, distance: float, tell: Callable[[str], object]
+    names: Sequence[str], rounds: int, distance: float, notify: Callable[[str], object]
 ) -> dict[str, list[Facts]]:
     """Run several, one after another, round by round.
 
@@ -99,7 +99,7 @@ def in_turn(
         names: Names of the runs.
         rounds: Number of repeats of each.
         distance: Distance [m].
-        tell: Called with a description of the next run.
+        notify: Called with a description of the next run.
 
     Returns:
         Rounds of each run, with ``others_cores``, the cores that other processes used meanwhile.
@@ -109,11 +109,11 @@ def in_turn(
         processes = {name: stack.enter_context(_process()) for name in names}
         for name, process in processes.items():
             if RUNS[name].workers == 1:  # workers start again each time
-                tell(f"{RUNS[name].words}, set-up")
+                notify(f"{RUNS[name].words}, set-up")
                 process.submit(perform, RUNS[name], WARM_UP).result()
         for i in range(rounds):
             for name, process in processes.items():
-                tell(f"{RUNS[name].words}, round {i + 1} of {rounds}")
+                notify(f"{RUNS[name].words}, round {i + 1} of {rounds}")
                 before = _cpu_seconds()
                 found = process.submit(perform, RUNS[name], distance).result()
                 wall, own, everyone = (now - then for now, then in zip(_cpu_seconds(), before, strict=True))

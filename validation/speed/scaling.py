@@ -59,11 +59,11 @@ INTERVALS = (1, 2, 5, 10, 50)  # steps between two samples of everything
 CHANNELS = (1, 3, 6, 10, 14)  # of each wheel, every step
 
 
-def scaling(effort: Effort, tell: Callable[[str], object]) -> Findings:
+def scaling(effort: Effort, notify: Callable[[str], object]) -> Findings:
     """Measure every axis, then the outputs."""
     calls = [(name, effort.bench_rounds, effort.bench_steps) for name in AXES]
     data = dict(zip(AXES, apart(measure_axis, *calls), strict=True))
-    tell("recorded outputs")
+    notify("recorded outputs")
     (data["outputs"],) = apart(measure_outputs, (effort.rounds, effort.distance))
     values = {f"{name}_exponent": found["exponent"] for name, found in data.items() if "exponent" in found}
     return Findings({**values, **data["outputs"]["values"]}, data)

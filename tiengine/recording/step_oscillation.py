@@ -1,0 +1,110 @@
+"""Oscillation of the wheel forces at the step's own frequency, watched during a run.
+
+A step that is unstable by a little lets the forces alternate from one step to the next, growing for thousands of steps
+before anything runs away. Real motion does not look so: the irregularity must be resolved by eight steps a wave, and
+the waves of an impact die out. So a few successive steps are looked at once in 20 ms: of an alternating force the sum
+of squared second differences is four times that of first differences, of a sine with eight steps a period 0.6 times.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiengine.parameters.arrays import Reals
+
+__all__ = ["StepOscillation"]
+
+WINDOW = 8
+"""Successive steps that are looked at."""
+
+EVERY = 2e-2
+"""Simulated time from one look to the next [s], at least a window."""
+
+ALTERNATING = 3.0
+"""Squared second differences over squared first ones: the mean of white noise, a sine of 3 steps a period."""
+
+LEAST = 0.01
+"""Amplitude over the static wheel load from which an oscillation counts: forces are wrong by as much."""
+
+LASTING = 0.1
+"""Time that an oscillation must last [s]: the waves of an impact die out in less. Windows without it count back: seats
+that pass modulate an oscillation."""
+
+GROWTH = 1.5
+"""Growth of the amplitude meanwhile."""
+
+LARGE = 0.2
+"""Amplitude over the static wheel load that needs no further growth: friction bounds what is saturated."""
+
+
+@dataclass(eq=False)
+class StepOscillation:
+    """Looks at vertical and lateral wheel forces; B trains, W wheelsets. Its arrays are part of a checkpoint.
+
+    Attributes:
+        samples: Vertical and lateral force at the last steps [N], shape (WINDOW, B, W, 2, 2).
+        lasted: How long each wheel's force has alternated, less how long it has not [s], shape (B, W, 2).
+        began: Amplitude when it began [N], same shape.
+    """
+
+    samples: Reals
+    lasted: Reals
+    began: Reals
+
+    @classmethod
+    def none(cls, trains: int, wheelsets: int) -> StepOscillation:
+        """Nothing oscillates yet."""
+        wheels = (trains, wheelsets, 2)
+        return cls(np.zeros((WINDOW, *wheels, 2)), np.zeros(wheels), np.zeros(wheels))
+
+    @staticmethod
+    def interval(dt: float) -> int:
+        """Steps of dt [s] from one look to the next."""
+        return max(round(EVERY / dt), WINDOW)
+
+    @staticmethod
+    def due(step: int, interval: int) -> bool:
+        """Whether a step, numbered from 1, belongs to a window."""
+        return (step - 1) % interval < WINDOW
+
+    def sample(self, step: int, interval: int, force: Reals) -> bool:
+        """Keep the forces if a step belongs to a window; whether it is the last of one.
+
+        Args:
+            step: Its number, from 1.
+            interval: See :meth:`interval`.
+            force: Vertical and lateral forces of the wheels [N], shape (B, W, 2, 2).
+        """
+        if not self.due(step, interval):
+            return False
+        place = (step - 1) % interval
+        self.samples[place] = force
+        return place == WINDOW - 1
+
+    def look(self, interval: float, static_load: float) -> tuple[NDArray[np.bool_], Reals]:
+        """Judge the window that has just been filled.
+
+        Args:
+            interval: Time since the last one [s].
+            static_load: Of a wheel [N].
+
+        Returns:
+            Wheels whose force oscillates, shape (B, W, 2), and the amplitude [N] of each.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            first = np.diff(self.samples, axis=0)
+            second = np.diff(first, axis=0)
+            squares = np.einsum("t...,t...->...", second, second)
+            alternates = squares / len(second) > ALTERNATING * np.einsum("t...,t...->...", first, first) / len(first)
+            sizes = np.where(alternates, 0.25 * np.sqrt(squares / len(second)), 0.0)  # +A, -A, +A differ by 4 A
+        size = sizes.max(axis=-1)
+        going = size > LEAST * static_load
+        fresh = going & (self.lasted == 0.0)
+        self.began[fresh] = size[fresh]
+        self.lasted += np.where(going, interval, -interval)
+        np.maximum(self.lasted, 0.0, out=self.lasted)
+        grown = (size > GROWTH * self.began) | (size > LARGE * static_load)
+        return going & (self.lasted > LASTING) & grown, size
