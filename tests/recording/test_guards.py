@@ -140,6 +140,21 @@ def test_the_scenario_decides(guard: Guard):
     assert guard.stopped == {}
 
 
+@pytest.mark.parametrize("policy", ["stop", "record"])
+def test_forces_that_alternate_from_step_to_step(policy: str):
+    """A lateral force of 5 kN to and fro: found once it has lasted for 0.1 s, in a look every 20 ms."""
+    guard = guard_of(Events(oscillation=policy))
+    guard.load(0, np.arange(1000.0))
+    for i in range(1000):
+        guard.stepper.rows = Rows(i)
+        guard.state.forces_on_rails[0, 1, 0, 1] = 5e3 * np.exp(1e-3 * i) * (-1) ** i
+        guard.watch_step()
+    event = only(guard)
+    assert (event.kind, event.wheelset, event.side, event.stops) == ("oscillation", 2, "left", policy == "stop")
+    assert event.time == pytest.approx(0.11, abs=0.021)
+    assert "numerics.time_step = 0.0001 or more passes" in event.words
+
+
 def test_the_end_of_a_measured_track(guard: Guard):
     """Noted once, when the leading wheel comes to it, 11.25 m ahead of the centre."""
     front = float(guard.stepper.ingredients.train.wheelset_x.max())

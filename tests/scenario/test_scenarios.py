@@ -217,7 +217,7 @@ def test_a_measured_series_limits_the_step(tmp_path):
 @pytest.mark.parametrize("functions", [(*SINES, "numerics.modes_per_metre=8"), (DAMPED,)])
 def test_an_unstable_step_is_refused(functions):
     """With the reason and what to change."""
-    settings = ("numerics.time_step=1e-3", *functions, "irregularity.spectrum='none'")
+    settings = ("numerics.time_step=1e-3", "train.distance=20", *functions, "irregularity.spectrum='none'")
     advice = r"numerics\.time_step = [\d.e-]+( or numerics\.passes = \d)? is stable$"
     with pytest.raises(InputError, match=r"numerics\.time_step = 0\.001: unstable; .*; " + advice):
         simulate.prepare(scenario("default", *settings))

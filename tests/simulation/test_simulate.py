@@ -26,7 +26,7 @@ SETTLED = 0.2  # s: three and a half slabs after the start
 @pytest.fixture(scope="module")
 def smooth() -> tuple[History, NDArray[np.float64]]:
     """One second on the smooth track, and the balance of forces of every rail; see ``balanced``."""
-    return balanced("smooth", duration=1.0)
+    return balanced("smooth", "numerics.passes=4", duration=1.0)
 
 
 def balanced(name: str, *overrides: str, duration: float) -> tuple[History, NDArray[np.float64]]:
@@ -79,11 +79,11 @@ def test_only_the_ripple_of_seats_and_slabs_remains(smooth):
     run, _ = smooth
     late = run.time > SETTLED
     force, phase = run.vertical[late].reshape(late.sum(), -1), 2.0 * np.pi * SPEED / SLAB_PITCH * run.time[late]
-    h = np.arange(1, 36)
+    h = np.arange(1, 101)  # to the eleventh harmonic of the seats, 1.7 kHz
     waves = np.hstack([np.ones((len(phase), 1)), np.cos(np.outer(phase, h)), np.sin(np.outer(phase, h))])
     found = np.linalg.lstsq(waves, force, rcond=None)[0]
     assert (force - waves @ found).std() < 1e-3 * force.std()
-    amplitude = np.hypot(found[1:36], found[36:])
+    amplitude = np.hypot(found[1:101], found[101:])
     assert np.all(amplitude.argmax(axis=0) == round(SLAB_PITCH / SEAT_PITCH) - 1)
 
 
@@ -117,24 +117,26 @@ def test_left_and_right_mirror_each_other(smooth):
 
 @pytest.mark.parametrize(("kind", "channel"), [(0, at.VERTICAL_FORCE), (1, at.LATERAL_FORCE)])
 def test_fastenings_and_inertia_carry_the_wheels_on_a_smooth_track(smooth, kind, channel):
-    """Action = reaction on either rail; the pinned ends, 8 m away, carry 1e-4 of the largest wheel load of the kind.
+    """Action = reaction on either rail; the pinned ends, 8 m away, carry 3e-4 of the wheels' forces, laterally 3e-3.
 
-    Ten decay lengths of 0.8 m to the end leave exp(-10) = 5e-5 vertically (FACTS 3.6), less laterally.
+    Ten decay lengths of 0.8 m to the end leave exp(-10) = 5e-5 of the static load (FACTS 3.6); the second and higher
+    harmonics of the seats, 308 Hz and more, travel along the rail. Four passes leave less than these (measured 1.6e-4
+    and 1.5e-3 with eight, 5e-4 and 3e-3 with two).
     """
     run, parts = smooth
     wheels = run.wheel[..., channel].sum(axis=1)
     scale = np.abs(run.wheel[..., channel]).sum(axis=1).mean()
-    assert np.abs(wheels - parts[:, :, kind].sum(axis=1)).max() < 1e-4 * scale * (1 if kind == 0 else 10)
+    assert np.abs(wheels - parts[:, :, kind].sum(axis=1)).max() < 3e-4 * scale * (1 if kind == 0 else 10)
 
 
 def test_fastenings_and_inertia_carry_the_wheels_on_a_rough_track():
     """The same where forces vary by 20 kN and 1.5 kN; lateral waves travel far, hence a window of 60 m.
 
     They leave 430 N at the ends of a window with 8 m at either end, 125 N with 12 m, 34 N with 20 m (measured), against
-    peaks of 8 kN of the lateral sum; vertically 16 N of 300 kN.
+    peaks of 8 kN of the lateral sum; vertically the waves above the track's cut-on reach them.
     """
-    run, parts = balanced("default", "numerics.window=60", duration=0.6)
-    for kind, channel, share in ((0, at.VERTICAL_FORCE, 1e-4), (1, at.LATERAL_FORCE, 1e-2)):
+    run, parts = balanced("default", "numerics.window=60", "numerics.passes=4", duration=0.6)
+    for kind, channel, share in ((0, at.VERTICAL_FORCE, 5e-4), (1, at.LATERAL_FORCE, 1e-2)):
         wheels = run.wheel[..., channel].sum(axis=1)
         scale = np.abs(wheels).max()
         assert np.abs(parts[:, 1, kind]).max() > 10.0 * share * scale  # inertia counts

@@ -40,7 +40,10 @@ def test_an_engine_that_refuses_is_a_miss_that_says_why():
 def test_outcomes_are_kept_until_their_case_is_gone(tmp_path):
     file = tmp_path / "outcomes.json"
     other = replace(CASE, name="other", compute=lambda: 0.6)
-    assert [o.verdict for o in keep([evaluate(CASE)], file, [CASE, other])] == ["ok"]
+    first = keep([evaluate(CASE)], file, [CASE, other])
+    assert [o.verdict for o in first] == ["ok", "not run"]
+    assert "1 of 1 cases met; 1 not run since" in markdown(first)
+    assert "other" not in headlines(first, ["other"])
     both = keep([evaluate(other)], file, [CASE, other])
     assert [o.verdict for o in both] == ["ok", "MISS"]
     assert "1 of 2 cases met; missed: other." in markdown(both)

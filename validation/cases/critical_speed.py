@@ -46,7 +46,6 @@ VISIBLE = 1e-4  # m: below this a motion counts as decayed
 BUMP, BUMP_START, BUMP_LENGTH = 6e-3, 30.0, 20.0  # m: the flange clearance high, a hunting wave long
 COARSE = (
     "numerics.window=26.0",
-    "numerics.modes_per_metre=1.0",
     "numerics.time_step=4e-4",
     "output.body_interval=0.004",
 )
@@ -170,7 +169,7 @@ def small_motion() -> tuple[complex, complex]:
         },
         "track": {"rail_profile": round_head(), "friction": 1.0, "fastening": seats},
         "irregularity": {"taper": 1.0},
-        "numerics": {"window": 26.0, "modes_per_metre": 1.0, "time_step": 2e-4},
+        "numerics": {"window": 26.0, "time_step": 2e-4},
         "output": {"precision": "double", "body_interval": 4e-3},
     }
     with tempfile.TemporaryDirectory() as folder:

@@ -1,9 +1,10 @@
-"""The engine's semi-discrete equations with sines as one first-order system, for general-purpose ODE solvers.
+"""The engine's semi-discrete equations as one first-order system, for general-purpose ODE solvers.
 
-Written with matrices, independently of the step and its kernels: linear parts from the host's M, C, K; fastenings as
-springs and dampers between a rail's shape at the moving seat and a slab's shape; only the wheel-rail contact and the
-nonlinear suspension elements are evaluated by the engine's kernels. y = (u, du/dt), u = (rails, slabs, vehicle), where
-a rail's coordinates are w, theta_y, v, theta_z, theta_x, N modes each.
+Written with matrices, independently of the step and its kernels, for either kind of trial functions: linear parts from
+the host's M, C, K; fastenings as springs and dampers between a rail's shape at the moving seat and a slab's shape; only
+the wheel-rail contact and the nonlinear suspension elements are evaluated by the engine's kernels. y = (u, du/dt),
+u = (rails, slabs, vehicle), where a rail's coordinates are (w, theta_y) function by function, then (v, theta_z,
+theta_x) function by function, n functions a field.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from tiengine.engine.equilibrium import ContactForces, evaluate_contact
-from tiengine.engine.sine_state import SineState
+from tiengine.engine.state import DISPLACEMENT, VELOCITY, State
 from tiengine.irregularity.irregularity import Irregularity
-from tiengine.kernels import layout as at
 from tiengine.kernels.suspension import suspension_forces
+from tiengine.model.constant_data import Model
 from tiengine.model.sine_model import SineModel
+from tiengine.parameters.arrays import Reals
 
 NUDGE = np.concatenate([np.full(5, 1e-9), np.full(5, 1e-7), np.full(18, 1e-9)])
 """Steps for the contact's derivatives: wheelset u and du/dt, then w, v, theta_x, slopes, rates of either rail."""
@@ -26,7 +28,7 @@ NUDGE = np.concatenate([np.full(5, 1e-9), np.full(5, 1e-7), np.full(18, 1e-9)])
 class SemiDiscrete:
     """M u'' + C u' + K u + fastenings(t, u, u') = gravity + suspension + contact(t, u, u'); one train, constant V."""
 
-    def __init__(self, model: SineModel, track: Irregularity, V: float, slabs: range) -> None:
+    def __init__(self, model: Model, track: Irregularity, V: float, slabs: range) -> None:
         """Assemble.
 
         Args:
@@ -40,7 +42,7 @@ class SemiDiscrete:
         sound, train = g.designs.matrices[0], g.train
         rail = [
             la.block_diag(*(m.toarray() for m in pair))
-            for pair in zip(model.window.vertical(V), model.window.lateral(V), strict=True)
+            for pair in zip(g.operators.vertical(V), g.operators.lateral(V), strict=True)
         ]
         slab = [sound.M, sound.C_bed, sound.K_plate + sound.K_bed]
         vehicle = [train.M, train.C + V * train.C_speed, train.K]
@@ -48,8 +50,13 @@ class SemiDiscrete:
             la.block_diag(r, r, *[s] * len(slabs), v) for r, s, v in zip(rail, slab, vehicle, strict=True)
         )
         self.inverse = la.block_diag(*[la.inv(x) for x in (rail[0], rail[0], *[slab[0]] * len(slabs), vehicle[0])])
-        self.n, self.modes, self.slab_dofs = len(self.M), g.modes, sound.n
-        self.first_slab_dof = 10 * g.modes
+        functions = g.functions.count
+        self.n, self.slab_dofs = len(self.M), sound.n
+        self.first_slab_dof = 10 * functions
+        one, three = 2 * np.arange(functions), 2 * functions + 3 * np.arange(functions)
+        rail_fields = np.stack([one, three, three + 2])
+        self.field = np.stack([rail_fields, 5 * functions + rail_fields])  # coordinates of w, v, theta_x by side
+        self.wheel_shape = [g.functions.shape(g.wheel_s, derivative) for derivative in (0, 1)]
         self.first_vehicle_dof = self.n - train.n
         self.dof = self.first_vehicle_dof + train.wheelset_dof
         self._seats()
@@ -73,15 +80,16 @@ class SemiDiscrete:
 
     def shapes(self, t: float) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
         """Which seats stand in the window at time t, the rails' shape there and its rate -V d/ds."""
-        s = (self.seats + 0.5) * self.model.ingredients.slab.fastening_pitch - self.V * t
-        here = (s > 0.0) & (s < self.model.ingredients.length)
-        k = self.model.window.wave_numbers
-        return here, np.sin(np.outer(s[here], k)), -self.V * k * np.cos(np.outer(s[here], k))
+        g = self.model.ingredients
+        s: Reals = np.asarray((self.seats + 0.5) * g.slab.fastening_pitch - self.V * t, dtype=np.float64)
+        here = (s > -g.seat_reach) & (s < g.length + g.seat_reach)
+        value, slope = (g.functions.shape(s[here], d, g.fastening.length) for d in (0, 1))
+        return here, value, -self.V * slope
 
     def fastening_forces(self, t: float, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Generalised forces of all fastenings, shape (n,)."""
         here, phi, rate = self.shapes(t)
-        rail_u, rail_v = (x[: self.first_slab_dof].reshape(2, 5, -1)[:, [0, 2, 4]] for x in (u, v))
+        rail_u, rail_v = u[self.field], v[self.field]
         W, D = phi @ rail_u.swapaxes(1, 2), phi @ rail_v.swapaxes(1, 2) + rate @ rail_u.swapaxes(1, 2)
         on_slab = self.on_slab[here][..., self.first_slab_dof : self.first_vehicle_dof].reshape(
             -1, self.first_vehicle_dof - self.first_slab_dof
@@ -91,8 +99,7 @@ class SemiDiscrete:
         de = (D @ self.arms.T).swapaxes(0, 1) - slab_v
         force = self.k * e + self.c * de
         out = np.zeros(self.n)
-        rails = out[: self.first_slab_dof].reshape(2, 5, -1)
-        rails[:, [0, 2, 4]] = -np.einsum("srm,mf,sn->rfn", force, self.arms, phi)
+        out[self.field] = -np.einsum("srm,mf,sn->rfn", force, self.arms, phi)
         out[self.first_slab_dof : self.first_vehicle_dof] = force.ravel() @ on_slab
         return out
 
@@ -100,19 +107,19 @@ class SemiDiscrete:
         """Fastenings as matrices: elongations E u, their rates E u' + F u; with k and c by row."""
         here, phi, rate = self.shapes(t)
         E = -self.on_slab[here]
-        F, n = np.zeros_like(E), self.modes
+        F = np.zeros_like(E)
         for side in range(2):
             for kind, field in np.argwhere(self.arms):
-                base, arm = (5 * side + 2 * field) * n, self.arms[kind, field]
-                E[:, side, kind, base : base + n] = arm * phi
-                F[:, side, kind, base : base + n] = arm * rate
+                place, arm = self.field[side, field], self.arms[kind, field]
+                E[:, side, kind, place] = arm * phi
+                F[:, side, kind, place] = arm * rate
         rows = 2 * len(phi)
         return E.reshape(-1, self.n), F.reshape(-1, self.n), np.tile(self.k, rows), np.tile(self.c, rows)
 
     def under_wheels(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """w, v, theta_x, their slopes and rates of the rails under the wheels, shape (W, 2, 9)."""
-        value, slope = self.model.wheel_shape
-        rails = [x[: self.first_slab_dof].reshape(2, 5, self.modes)[:, [0, 2, 4]] for x in (u, v)]
+        value, slope = self.wheel_shape
+        rails = [x[self.field] for x in (u, v)]
         parts = [np.einsum("wn,rfn->wrf", a, x) for a, x in ((value, rails[0]), (slope, rails[0]), (value, rails[1]))]
         return np.concatenate(parts, axis=2)
 
@@ -137,9 +144,9 @@ class SemiDiscrete:
 
     def _on_rails(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Generalised forces of wheels on the rails, from forces on w, v, theta_x, shape (W, 2, 3)."""
-        out = np.zeros((2, 5, self.modes))
-        out[:, [0, 2, 4]] = np.einsum("wn,wrf->rfn", self.model.wheel_shape[0], force)
-        return out.ravel()
+        out = np.zeros(self.first_slab_dof)
+        out[self.field] = np.einsum("wn,wrf->rfn", self.wheel_shape[0], force)
+        return out
 
     def _on_vehicle(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Gravity, nonlinear suspension, gyroscopic pair of the pitch rates."""
@@ -164,9 +171,8 @@ class SemiDiscrete:
             place = np.zeros((n, 11))
             place[self.dof[w], np.arange(5)] = 1.0
             for side in range(2):
-                for m, field in enumerate((0, 2, 4)):
-                    base = (5 * side + field) * self.modes
-                    place[base : base + self.modes, 5 + 3 * side + m] = self.model.wheel_shape[0, w]
+                for m in range(3):
+                    place[self.field[side, m], 5 + 3 * side + m] = self.wheel_shape[0][w]
             by_u += place @ (J @ inputs[0])
             by_v += place @ (J @ inputs[1])
         return np.block([[np.zeros((n, n)), np.eye(n)], [self.inverse @ by_u, self.inverse @ by_v]])
@@ -188,19 +194,23 @@ class SemiDiscrete:
             rows = np.zeros((2, 28, self.n))
             rows[0, np.arange(5), self.dof[w]] = rows[1, 5 + np.arange(5), self.dof[w]] = 1.0
             for side in range(2):
-                for m, field in enumerate((0, 2, 4)):
-                    base = slice((5 * side + field) * self.modes, (5 * side + field + 1) * self.modes)
-                    rows[0, 10 + 9 * side + m, base] = rows[1, 16 + 9 * side + m, base] = self.model.wheel_shape[0, w]
-                    rows[0, 13 + 9 * side + m, base] = self.model.wheel_shape[1, w]
+                for m in range(3):
+                    place = self.field[side, m]
+                    rows[0, 10 + 9 * side + m, place] = rows[1, 16 + 9 * side + m, place] = self.wheel_shape[0][w]
+                    rows[0, 13 + 9 * side + m, place] = self.wheel_shape[1][w]
             out.append(rows)
         return out
 
-    def pack(self, state: SineState) -> NDArray[np.float64]:
+    def pack(self, state: State) -> NDArray[np.float64]:
         """The y of an engine's state whose window begins at the first of the slabs."""
+        parts = {name: state.part(0, name) for name in ("vertical", "lateral", "slabs", "vehicles")}
+        if isinstance(self.model, SineModel):  # whose coordinates stand field by field
+            for name, fields in (("vertical", 2), ("lateral", 3)):
+                by_field = parts[name].reshape(len(parts[name]), 2, fields, -1)
+                parts[name] = by_field.swapaxes(2, 3).reshape(parts[name].shape)
         halves = []
-        for row in (at.U, at.V):
-            vertical, lateral = state.view(row, "vertical")[0], state.view(row, "lateral")[0]
-            slots = state.view(row, "slabs")[0]
+        for row in (DISPLACEMENT, VELOCITY):
+            vertical, lateral, slots, vehicle = (parts[name][row] for name in parts)
             slabs = [slots[slab % len(slots)] for slab in self.slabs]
-            halves += [np.hstack([vertical, lateral]).ravel(), *slabs, state.view(row, "vehicles")[0]]
+            halves += [np.hstack([vertical, lateral]).ravel(), *slabs, vehicle]
         return np.concatenate(halves)

@@ -64,8 +64,8 @@ class Spectrum:
 
 @cache
 def smooth() -> Spectrum:
-    """On a smooth track, 4 modes per metre so that waves as short as the seats' pitch are carried."""
-    changes = ("train.distance=170.0", f"numerics.time_step={DT}", "numerics.modes_per_metre=4.0")
+    """On a smooth track."""
+    changes = ("train.distance=170.0", f"numerics.time_step={DT}")
     force = simulate("smooth", *changes).vertical[-2 * PERIOD :]
     f, S = signal.welch(force, 1.0 / DT, nperseg=PERIOD, axis=0)
     return Spectrum(f, S.mean(axis=(1, 2)), np.full(len(f), np.nan))

@@ -15,7 +15,7 @@ from tiengine.parameters.arrays import Reals
 __all__ = ["Case", "Outcome", "evaluate"]
 
 Kind = Literal["verification", "validation", "full length", "convergence", "information"]
-Verdict = Literal["ok", "MISS", "for information", "left out"]
+Verdict = Literal["ok", "MISS", "for information", "left out", "not run"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,7 +27,7 @@ TITLES = {
     "convergence": "Against finer settings of the engine",
     "information": "For information",
 }
-_COLOURS = {"ok": "green", "MISS": "bold red", "for information": "dim", "left out": "yellow"}
+_COLOURS = {"ok": "green", "MISS": "bold red", "for information": "dim", "left out": "yellow", "not run": "yellow"}
 
 
 def _row(outcome: Outcome) -> tuple[str, ...]:
@@ -82,7 +82,7 @@ def headlines(outcomes: Sequence[Outcome], names: Sequence[str]) -> str:
     lines = [f"{_score(outcomes)} All of them: [table](validation/report/verification.md).", ""]
     lines += [_line(columns), _line(["---"] * len(columns))]
     for outcome in outcomes:
-        if outcome.case.name in names:
+        if outcome.case.name in names and outcome.verdict != "not run":
             cells = (outcome.case.quantity, outcome.reference, outcome.ours, outcome.tolerance, outcome.case.source)
             lines.append(_line(cells))
     return "\n".join(lines) + "\n"
@@ -91,8 +91,11 @@ def headlines(outcomes: Sequence[Outcome], names: Sequence[str]) -> str:
 def _score(outcomes: Sequence[Outcome]) -> str:
     judged = [outcome for outcome in outcomes if outcome.verdict in ("ok", "MISS")]
     missed = [outcome.case.name for outcome in judged if outcome.verdict == "MISS"]
-    return f"`python -m validation`: {len(judged) - len(missed)} of {len(judged)} cases met" + (
-        f"; missed: {', '.join(missed)}." if missed else "."
+    waiting = sum(outcome.verdict == "not run" for outcome in outcomes)
+    return (
+        f"`python -m validation`: {len(judged) - len(missed)} of {len(judged)} cases met"
+        + (f"; missed: {', '.join(missed)}" if missed else "")
+        + (f"; {waiting} not run since what they test has changed." if waiting else ".")
     )
 
 
@@ -105,14 +108,14 @@ def keep(outcomes: Sequence[Outcome], file: Path, cases: Sequence[Case]) -> list
         cases: All cases; outcomes of cases that no longer exist are dropped.
 
     Returns:
-        All known outcomes, in the order of the cases.
+        Outcomes of all cases in their order; those of which the file knows nothing are "not run".
     """
     known = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     for outcome in outcomes:
         known[outcome.case.name] = {name: getattr(outcome, name) for name in TEXTS}
     known = {case.name: known[case.name] for case in cases if case.name in known}
     file.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
-    return [Outcome(case, **known[case.name]) for case in cases if case.name in known]
+    return [Outcome(case, **known.get(case.name, {"verdict": "not run"})) for case in cases]
 
 
 def insert(text: str, file: Path) -> None:
