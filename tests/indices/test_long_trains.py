@@ -158,3 +158,15 @@ def test_the_worst_vehicle_stands_for_the_train(tmp_path):
     shown = CliRunner().invoke(main, ["metrics", str(tmp_path / "a.h5")]).output
     assert "wheelset 7, vehicle 2" in " ".join(shown.split())
     assert "20 (7)" in shown
+
+
+def test_an_ensemble_of_trains_of_different_length(tmp_path):
+    """A train of three cars and one of two, whose second car has the largest force."""
+    extremes = []
+    for cars, force in ((3, 100e3), (2, 110e3)):
+        forces = long.wheel(cars, SAMPLES)
+        forces["vertical_force"][50, 5, 0] = force
+        with by.made(tmp_path / f"{cars}.h5", long.train_of(cars), {"wheel": forces}) as result:
+            extremes.append(wheel_extremes(Train(result)))
+    (largest, *_) = by_car(3, [], extremes)
+    assert [cell.value for cell in largest.cells] == [70.0, 110.0, 70.0]

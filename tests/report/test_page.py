@@ -21,6 +21,7 @@ from tiengine.result_files.reader import RUNNING
 from tiengine.scenario.scenario import load_scenario
 
 from .. import hand_made as by
+from .. import long_trains as long
 
 VOID_TAGS = {"meta", "img", "br", "link"}
 EVIL = '<script src="x"> & $x$ 轨道'
@@ -248,3 +249,25 @@ def test_unfinished_files_are_drawn(tmp_path, few_figures):
     """An unfinished run: its results so far, with a notice."""
     with by.made(tmp_path / "a.h5", by.scenario(), groups(300), status=RUNNING) as result:
         assert "The run is not complete: running" in render(result)
+
+
+def test_a_train_has_a_table_by_vehicle(tmp_path, few_figures):
+    """Three cars: the second has 150 kN and 30 kN sideways, the first a wheel of 20 kN; a single car has no table."""
+    wheel = long.wheel(3, 900)
+    wheel["vertical_force"][500, 6, 1], wheel["vertical_force"][500, 2, 0] = 150e3, 20e3
+    wheel["lateral_force"][500, 5, 0] = -30e3
+    tracks = {"wheel": wheel, "body": long.body(3, 900)}
+    with by.made(tmp_path / "a.h5", long.train_of(3), tracks) as result:
+        text = render(result)
+    assert "#vehicles" in Page(text).links
+    begin = text.index('<section id="vehicles">')
+    table = Page(text[begin : text.index("</section>", begin) + len("</section>")])
+    columns = table.texts["th"].index("1") - 1
+    assert table.texts["th"][:4] == ["vehicle", "largest Q [kN]", "smallest Q [kN]", "largest |Y| [kN]"]
+    rows = [table.texts["td"][k * columns : k * columns + 3] for k in range(3)]
+    assert rows == [["70", "20", "0"], ["150", "70", "30"], ["70", "70", "0"]]
+    places = table.texts["span"]
+    assert places[1] == "wheelset 3 left"
+    assert places[columns : columns + 3 : 2] == ["wheelset 7 right", "wheelset 6 left"]
+    with by.made(tmp_path / "b.h5", by.scenario(), groups(300)) as result:
+        assert "vehicles" not in Page(render(result)).ids

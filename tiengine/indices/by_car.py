@@ -88,6 +88,8 @@ def _force(
     for each, force in zip(extremes, forces, strict=True):
         for v in range(vehicles):
             wheelsets = np.flatnonzero(each.vehicle == v)
+            if not len(wheelsets):  # a shorter train of the ensemble
+                continue
             values = sign * np.nan_to_num(force.value[wheelsets], nan=-sign * np.inf)
             w, side = np.unravel_index(int(np.argmax(values)), values.shape)
             known, value = cells[v].value, 1e-3 * sign * float(values[w, side])

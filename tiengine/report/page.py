@@ -129,7 +129,7 @@ def _notice(result: Result) -> str:
 def _indices(result: Result) -> dict[str, Any]:
     """Worst indices by standard, those by vehicle, their notes, and an overall verdict."""
     complete = [i for i in range(result.trains) if result.status(i) == COMPLETE]
-    vehicles = len(result.scenario.train.vehicles)
+    vehicles = max(len(train.train.vehicles) for train in result.scenario.members)
     try:
         metrics = result.metrics()
     except InputError as error:

@@ -86,10 +86,12 @@ class SteadyTrack:
         K = sp.block_diag([*rail, *rail, *plates], format="csc") + stretch.T @ pull
         self._lu: SuperLU = splu(sp.csc_array(K))
         value, slope = (_under_wheels(operators, wheel_s, d, K.shape[0]) for d in (0, 1))
-        self._place = value.T.toarray()
-        q = self._lu.solve(self._place)
+        self._place = sp.csc_array(value.T)
         W = len(wheel_s)
-        moved, turned = ((rows @ q).reshape(W, 2, 3, W, 2, 3) for rows in (value, slope))
+        moved, turned = (np.empty((W, 2, 3, W, 2, 3)) for _ in range(2))
+        for u in range(W):  # wheel by wheel: displacements of all unknowns under all wheels would take 100 MB
+            q = self._lu.solve(self._place[:, 6 * u : 6 * u + 6].toarray())
+            moved[:, :, :, u], turned[:, :, :, u] = ((rows @ q).reshape(W, 2, 3, 2, 3) for rows in (value, slope))
         if wheel_residual is not None:
             wheel, side, field = np.ix_(np.arange(W), np.arange(2), np.arange(3))
             moved[wheel, side, field, wheel, side, field] += wheel_residual[:, None]
@@ -177,14 +179,14 @@ def _springs(
 def _slab_rows(seats: SeatsInWindow, slabs: Sequence[SlabMatrices], side: int, kind: int, b: float) -> sp.csr_array:
     """Rows for the slabs' motion at the seats: w, b dw/dy, or lateral, shape (k, slabs dofs)."""
     dofs = slabs[0].n if slabs else 0
-    rows = np.zeros((len(seats.s), len(slabs), dofs))
+    rows = sp.lil_array((len(seats.s), len(slabs) * dofs))
     for i, (slab, seat) in enumerate(zip(seats.slab, seats.seat, strict=True)):
         if slab == RIGID_GROUND:
             continue
-        design, row = slabs[slab], rows[i, slab]
+        design, first = slabs[slab], int(slab) * dofs
         if kind == 2:
-            row[-2:] = 1.0, design.seat_x[seat]
+            rows[i, [first + dofs - 2, first + dofs - 1]] = 1.0, design.seat_x[seat]
         else:
             shape = design.seat_w if kind == 0 else b * design.seat_slope
-            row[design.seat_index[seat, side]] = shape[seat, side]
-    return sp.csr_array(rows.reshape(len(seats.s), -1))
+            rows[i, first + design.seat_index[seat, side]] = shape[seat, side]
+    return sp.csr_array(rows)
