@@ -165,7 +165,7 @@ def test_an_ensemble_of_trains_of_different_length(tmp_path):
     extremes = []
     for cars, force in ((3, 100e3), (2, 110e3)):
         forces = long.wheel(cars, SAMPLES)
-        forces["vertical_force"][50, 5, 0] = force
+        forces["vertical_force"][500, 5, 0] = force
         with by.made(tmp_path / f"{cars}.h5", long.train_of(cars), {"wheel": forces}) as result:
             extremes.append(wheel_extremes(Train(result)))
     (largest, *_) = by_car(3, [], extremes)

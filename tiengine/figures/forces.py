@@ -82,9 +82,9 @@ class _Forces:
         self.bands = [Band(*limits, bins_for(len(samples))) for _ in range(2)]
         position = samples.group["position"]
         settling = math.ceil(low_pass_settling(FORCE_CUT_OFF) / samples.interval)
-        first, last = first_samples(train, samples), max(len(samples) - 1 - settling, 0)
-        self._counted = [(float(position[max(i, settling)]), float(position[last])) if max(i, settling) < last
-                         else (begin, end) for i in map(int, first)]  # fmt: skip
+        first, last = np.maximum(first_samples(train, samples), settling), max(len(samples) - 1 - settling, 0)
+        none = (np.inf, -np.inf) if first.min() < last else (begin, end)
+        self._counted = [(float(position[i]), float(position[last])) if i < last else none for i in map(int, first)]
         kept = count if train.model.wheelset_vehicle[-1] else 1
         sides = {"Q": 2, "Y": 2, "axle": 1, "quotient": 2}
         self.curves = {
