@@ -13,7 +13,8 @@ from tiengine.kernels import layout as at
 from tiengine.parameters.input_files import load_toml
 from tiengine.parameters.presets import find_preset
 from tiengine.parameters.quantity import build
-from tiengine.track.rail import Rail, RailWindow, sine_products
+from tiengine.track.rail import Rail, RailWindow
+from tiengine.track.sines import sine_products
 
 from ..explicit import Explicit
 from ..models import V350, paper_model

@@ -16,7 +16,8 @@ from tiengine.model.newmark import inverse
 from tiengine.model.speed_blocks import Blocks
 from tiengine.parameters.arrays import Reals
 from tiengine.track.fastening import seat_tables
-from tiengine.track.rail import RailWindow, sine_products
+from tiengine.track.rail import RailWindow
+from tiengine.track.sines import sine_products
 
 __all__ = ["SineModel", "build_sine_model"]
 

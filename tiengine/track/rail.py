@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from scipy.special import zeta
 
 from tiengine.parameters.quantity import Name, Params, Q, Source
+from tiengine.track.sines import sine_products
 
-__all__ = ["Rail", "RailWindow", "sine_products"]
+__all__ = ["Rail", "RailWindow"]
 
 
 class Rail(Params):
@@ -49,19 +50,6 @@ class Rail(Params):
         """Mass density of w, theta_y, v, theta_z, theta_x [kg/m, kg m, kg/m, kg m, kg m], shape (5,)."""
         m = self.mass_per_length
         return np.array([m, self.rho * self.Iy, m, self.rho * self.Iz, self.rho * self.I_polar])
-
-
-def sine_products(modes: int) -> NDArray[np.float64]:
-    """Compute the products G_ij = int W_i W_j' ds, independent of the window's length.
-
-    Returns:
-        For sin(k_i s): 2 i j / (i^2 - j^2); for cos(k_i s): 2 j^2 / (i^2 - j^2); zero for i + j even. Shape (2, N, N).
-    """
-    i = np.arange(1, modes + 1)[:, None]
-    j = np.arange(1, modes + 1)[None, :]
-    odd = (i + j) % 2 == 1
-    denominator = np.where(odd, i**2 - j**2, 1)
-    return np.stack([np.where(odd, 2 * i * j / denominator, 0.0), np.where(odd, 2 * j**2 / denominator, 0.0)])
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ __all__ = ["Sines", "sine_products"]
 
 
 def sine_products(modes: int) -> NDArray[np.float64]:
-    """Products G_ij = int W_i W_j' ds, independent of the window's length.
+    """Compute the products G_ij = int W_i W_j' ds, independent of the window's length.
 
     Returns:
         For sin(k_i s): 2 i j / (i^2 - j^2); for cos(k_i s): 2 j^2 / (i^2 - j^2); zero for i + j even. Shape (2, N, N).
@@ -60,7 +60,7 @@ class Sines:
         return Products(of_sines, of_cosines, sp.csr_array(sp.diags_array(half * k)))
 
     def shape(self, s: NDArray[np.float64], derivative: int = 0, over: float = 0.0) -> NDArray[np.float64]:
-        """See :class:`tiengine.track.trial_functions.TrialFunctions`; beyond the ends the sines go on."""
+        """See :class:`tiengine.track.trial_functions.TrialFunctions`; beyond the ends the sines continue."""
         k, phase = self.wave_numbers, np.multiply.outer(s, self.wave_numbers)
         found: NDArray[np.float64] = (k * np.cos(phase) if derivative else np.sin(phase)) * mean_cosine(k, over)
         return found

@@ -39,6 +39,8 @@ BRIDGE = Crossing(2.87e9 * 2.90, 2303.0, 25.0, 100.0 / 3.6, 5750.0, 1595e3)
 DAMPED = replace(BRIDGE, damping=0.05 * 2.0 * np.sqrt(1595e3 * 5750.0))
 RAIL_SPAN, RAIL_SPEED = 6.0, 350.0 / 3.6
 MODES, STEPS, SAMPLES = 20, 9000, 90
+MANY = 400  # modes that leave 1e-4 of the rail's deflection
+BED = 6e7  # N/m^2, a railway's: what splines lack under a load is local, so that any bed between 1e6 and 1e8 gives it
 SOURCE = "Fryba 1999, ch. 1 and 2; bridge of Yang and Yau 1997"
 
 
@@ -159,6 +161,17 @@ def _ours(what: str) -> Reals:
     return found.ravel() if sprung else found[0]
 
 
+def _exact_rail() -> Reals:
+    """Closed form with as many modes as matter, since splines have no end at the twentieth half wave [mm]."""
+    return 1e3 * force_timoshenko(vertical_beam(), _rail_crossing(), RAIL_SPAN / 2.0, _times(_rail_crossing()), MANY)
+
+
+def _missing() -> float:
+    """Static deflection that splines on 20 spans lack under the load at mid-span, where a knot is [mm]."""
+    window = SplineWindow.uniform(_rail_window().rail, RAIL_SPAN, RAIL_SPAN / MODES)
+    return 1e3 * _rail_crossing().weight * window.missing(BED)
+
+
 def _rail_by_splines() -> Reals:
     """Mid-span deflection of the rail by splines on knots at one distance [mm]."""
     window = SplineWindow.uniform(_rail_window().rail, RAIL_SPAN, RAIL_SPAN / MODES)
@@ -204,9 +217,9 @@ CASES = (
         kind="verification",
         quantity=f"{_WHAT['rail']} [mm], {SAMPLES} instants, splines on {MODES} spans, {STEPS} steps",
         source=SOURCE,
-        reference=lambda: _exact("rail"),
-        atol=_allowed(_rail_crossing(), STEPS),
-        why="as with sines, whose closed form has 20 modes",
+        reference=_exact_rail,
+        atol=_allowed(_rail_crossing(), STEPS) + _missing(),
+        why="as with sines, and the static compliance that the splines lack under the load",
         compute=_rail_by_splines,
     ),
     Case(

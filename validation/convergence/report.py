@@ -206,8 +206,8 @@ def _moved() -> list[str]:
     return [
         *lines,
         "",
-        "The seats do it: a point damper that passes under a point wheel makes its force jump by c V P / (kappa G A),",
-        "1.4 kN, at every seat; over 0.15 m the jump is spread. The trial functions and the window change little.",
+        "A point damper that passes under a point wheel makes its force jump by c V P / (kappa G A), 1.4 kN, at every",
+        "seat; over 0.15 m the jump is spread, which no trial functions could follow before.",
         "`paper` keeps the paper's rails: 60 sines in 36 m, point seats, no correction; it is unchanged, and its last",
         "line tells how far these rails are from the default's on the same track.",
     ]
