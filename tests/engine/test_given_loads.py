@@ -57,7 +57,7 @@ def loaded(model: Model, *factors: float) -> Stepper:
     model = replace(model, ingredients=g, dims=shared_arrays(g)["dims"])
     state = state_at_rest(model)
     equilibrium(model, state, 0.0, V350)
-    stepper = make_stepper(model, state, Chunk.empty(g, STEPS, STEPS, STEPS))
+    stepper = make_stepper(model, state, Chunk.empty(g, STEPS, STEPS))
     zero, V = np.zeros(STEPS), np.full(STEPS, V350)
     stepper.load(zero, V, zero, np.zeros_like(stepper.chunk.irregularity), g.given_loads(zero, zero, V, zero))
     return stepper

@@ -90,7 +90,7 @@ class SplineStep:
     Attributes:
         state: What is advanced, in place.
         job: First step, number of steps, stages (``spline_layout``) of the next launch.
-        record: Rows of the wheels' and of the bodies' record that each step fills, -1 for none, shape (steps, 2).
+        record: Row of the bodies' record that each step fills, -1 for none, shape (steps,).
         launch: The bound kernel; ``launch.vector_mode`` tells how it was compiled.
     """
 
@@ -128,7 +128,7 @@ class SplineStep:
             contact: Arrays of the contact.
             clock: Window at the end of each step, shape (steps, N_CLOCK).
             irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
-            wheel_record: Wheel output, shape (B, rows, W, 2, N_WHEEL).
+            wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
             bed: Bed, read if MORTAR_MODE is not 0.
             loads: Loads of the cars.
@@ -143,7 +143,7 @@ class SplineStep:
         car_load = loads.array.reshape(-1, 8)
         self.state, self.size = state, size
         self.job = np.array([0, 1, at.ALL_STAGES], dtype=np.int32)
-        self.record = np.full((len(clock), 2), -1, dtype=np.int32)
+        self.record = np.full(len(clock), -1, dtype=np.int32)
         arrays = (
             self.job, self.record, size, dims, constants, clock,
             state.rail, rails.coefficient,
