@@ -171,6 +171,48 @@ def status(folder: Path) -> None:
     print_rows(Folder.open(folder).status().rows())
 
 
+@study.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help=".csv or .parquet, replaced; default: FOLDER/table.csv."
+)
+def table(folder: Path, output: Path | None) -> None:
+    """Write the table of the study in FOLDER: one row a train with factors, key figures and failures."""
+    from tiengine.study.folder import Folder
+    from tiengine.study.table import read_table
+
+    found, path = read_table(Folder.open(folder)), output or folder / "table.csv"
+    found.write(path)
+    click.echo(f"{path}: {len(found)} rows of {len(found.columns)} columns")
+
+
+@study.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Page to write, replaced; default: FOLDER/report.html."
+)
+def report(folder: Path, output: Path | None) -> None:
+    """Write a page on the study in FOLDER: percentiles, extremes, influences, convergence, bands."""
+    from tiengine.study.folder import Folder
+    from tiengine.study.page import write
+
+    path = output or folder / "report.html"
+    write(Folder.open(folder), path)
+    click.echo(str(path))
+
+
+@study.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Result file to write.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def merge(folder: Path, output: Path, force: bool) -> None:
+    """Copy all parts of the study in FOLDER into one result file, as of an ensemble."""
+    from tiengine.study.folder import Folder
+    from tiengine.study.merge import merge
+
+    click.echo(f"{output}: {merge(Folder.open(folder), output, force=force)} trains")
+
+
 COMMANDS = (study,)
 
 

@@ -53,7 +53,8 @@ def check_space(scenario: Scenario, path: Path) -> None:
     if needed > free:
         raise InputError(
             f"output = '{path}': needs about {size_text(needed)}, {size_text(free)} are free:"
-            f" {size_text(needed - free)} are missing; record fewer channels, longer output intervals, or write to another disk"
+            f" {size_text(needed - free)} are missing; record fewer channels, longer output intervals, or write to"
+            " another disk"
         )
 
 

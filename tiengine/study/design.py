@@ -78,7 +78,7 @@ class Design:
         return hashlib.sha256(json.dumps(self.tables(), sort_keys=True).encode()).hexdigest()
 
     def values(self, member: int) -> dict[str, Any]:
-        """What tables show of the factors of a member, by name.
+        """Values in tables of the factors of a member, by name.
 
         Args:
             member: Its number.

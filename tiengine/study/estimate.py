@@ -24,7 +24,7 @@ SHORT = 4.0  # m, distance of the timing
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a study takes.
+    """Size and duration of a study.
 
     Attributes:
         points, trains, tasks: Numbers.

@@ -151,6 +151,10 @@ class Plan(Params):
         Field(description="expressions of factors such as 'speed * friction < 120'; others are left out"),
     ] = ()
 
+    quantities: Annotated[
+        tuple[str, ...],
+        Field(description="columns of key figures that the report shows in full; the first three if none"),
+    ] = ()
     indices: Annotated[
         bool,
         Field(description="indices of the standards are evaluated besides the key figures; takes up to 0.2 s a train"),

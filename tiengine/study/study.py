@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from tiengine.parameters.errors import InputError
 from tiengine.study.design import expand
@@ -16,6 +16,10 @@ from tiengine.study.plan import Plan, load_plan
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from tiengine.study.extreme_values import ExtremeLaw
+    from tiengine.study.percentiles import Percentile
+    from tiengine.study.sensitivity import SobolIndex, Swing
+    from tiengine.study.table import Table
     from tiengine.study.watch import Watch
     from tiengine.study.work import Evaluate, Work
 
@@ -183,6 +187,74 @@ class Study:
                 run_here(self.folder, tasks, work, watch, cores() if workers is None else workers)
             watch.end()
         return self
+
+    def table(self) -> Table:
+        """Table of the trains that are done: factors, key figures, failures with their reasons."""
+        from tiengine.study.table import read_table
+
+        return read_table(self.folder)
+
+    def percentiles(self, figure: str, percents: Sequence[float]) -> list[Percentile]:
+        """Percentiles of a key figure over the trains, with intervals by the bootstrap.
+
+        Args:
+            figure: Its column in the table.
+            percents: Shares of the trains [%].
+
+        Raises:
+            InputError: There is no such figure.
+        """
+        from tiengine.study.percentiles import percentiles
+
+        return percentiles(self.table().values(figure), percents)
+
+    def extremes(self, figure: str, law: Literal["auto", "gumbel", "gev"] = "auto") -> ExtremeLaw:
+        """Extreme-value law of a key figure, a train being a block; its ``levels`` have intervals.
+
+        Args:
+            figure: Its column in the table; names that begin with ``smallest`` have a law of smallest values.
+            law: ``"gumbel"``, ``"gev"``, or ``"auto"`` for Gumbel's unless the data speak against it.
+
+        Raises:
+            InputError: There is no such figure, or there are too few trains.
+        """
+        from tiengine.study.extreme_values import fit_extremes
+
+        return fit_extremes(self.table().values(figure), law, smallest=figure.startswith("smallest"))
+
+    def swings(self, figure: str) -> list[Swing]:
+        """Ranges over which the mean of a key figure moves with each factor, the widest first.
+
+        Args:
+            figure: Its column in the table.
+        """
+        from tiengine.study.sensitivity import swings
+
+        return swings(self.table(), figure)
+
+    def sobol(self, figure: str, blocks: int | None = None) -> list[SobolIndex]:
+        """First-order and total Sobol' indices of a key figure, from the design ``saltelli``.
+
+        Args:
+            figure: Its column in the table.
+            blocks: Number of blocks of the design that are used, to see the convergence; all if None.
+
+        Raises:
+            InputError: The plan has another design, too few blocks are complete, or SALib is missing.
+        """
+        from tiengine.study.sensitivity import sobol_indices
+
+        return sobol_indices(self.folder.design.plan, self.table(), figure, blocks)
+
+    def report(self, path: str | Path) -> None:
+        """Write a page with all answers.
+
+        Args:
+            path: HTML file, which is replaced.
+        """
+        from tiengine.study.page import write
+
+        write(self.folder, Path(path))
 
     def _share(self, part: tuple[int, int] | None) -> list[int]:
         """Numbers of the tasks that are left in a share."""

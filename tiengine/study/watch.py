@@ -1,4 +1,4 @@
-"""What whoever leads a study sees and says: progress, sentences, a request to stop; and the problems that tasks had."""
+"""Watch of the leader of a study: progress, sentences, a request to stop; and the problems that tasks had."""
 
 from __future__ import annotations
 
