@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table_cache import contact_table
+from tiengine.model.curve_loads import CurveLoads
 from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.model.newmark import Newmark
 from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.defects import fastening_factors
 from tiengine.track.slab_matrices import slab_designs
-from tiengine.vehicle.train import assemble
+from tiengine.vehicle.given_loads import LoadSource
+from tiengine.vehicle.train import TrainModel, assemble
 
 __all__ = ["ingredients"]
 
@@ -52,7 +54,14 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         local_compliance=numerics.truncation == "local",
         absorbing_zone=numerics.absorbing_zone,
         explicit_mortar=numerics.mortar == "explicit",
+        given=_given(scenario, train),
     )
+
+
+def _given(scenario: Scenario, train: TrainModel) -> tuple[LoadSource, ...]:
+    """Given loads of the train: those of a line that is not straight and level."""
+    line = scenario.track.line
+    return () if line is None else (CurveLoads(line, train),)
 
 
 def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64]]:
