@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
     parts, numerics = scenario.parts, scenario.numerics
     asked = scenario.train
     train = assemble(parts.vehicles, parts.centres, series_springs=asked.series_springs or None, effort=asked.effort)
+    if scenario.track.line is not None:
+        train = replace(train, K=train.K + train.K_leaning)
     return Ingredients(
         rail=parts.rail,
         fastening=parts.fastening,
