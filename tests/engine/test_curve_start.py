@@ -96,7 +96,7 @@ def test_load_moves_to_the_outer_rail_by_the_lever_of_every_body():
     moment -= float(
         np.sum(train.wheelset_spin_inertia / train.wheel_radius) * V350**2 / R
     )  # gyroscopic, -J V/r kappa V
-    vertical, lateral = forces(state)
+    vertical, _ = forces(state)
     b0 = float(train.half_spacing[0])
     transfer = float((vertical[:, 1] - vertical[:, 0]).sum()) * b0
     # contacts move on the heads by some mm of 746, rails yield by less than a millimetre under 70 kN a wheel

@@ -60,15 +60,14 @@ def rows(random: np.random.Generator) -> list[list[Any]]:
 
 
 def test_random_alignments_are_refused_in_one_line_or_give_loads():
-    kept = 0
+    kept, refused = 0, []
     for seed in range(COUNT):
         random = np.random.default_rng((17, seed))
         track = {"alignment": elements(random)} if seed % 2 else {"alignment_rows": rows(random)}
         try:
             line = build(Track, to_tuples(track, "track"), "track").line
         except InputError as error:
-            assert "\n" not in str(error), seed
-            assert str(error).startswith("track.alignment"), (seed, str(error))
+            refused.append(str(error))
             continue
         kept += 1
         assert line is not None
@@ -77,4 +76,5 @@ def test_random_alignments_are_refused_in_one_line_or_give_loads():
         for values in (loads.force, loads.elongation, loads.frame_rate):
             assert np.isfinite(values).all(), seed
         assert np.abs(loads.frame_rate).max() < 0.1  # rad/s: 20 m/s on 250 m, or over a twist of 2.5 mm/m
+    assert all(text.startswith("track.alignment") and "\n" not in text for text in refused)
     assert COUNT / 10 < kept < COUNT  # both happen

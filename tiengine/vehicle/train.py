@@ -71,7 +71,7 @@ class TrainModel:
         body_height: Centre of gravity above the rails [m], shape (bodies,).
         body_vehicle_x: Centre of each body's vehicle relative to the first's, forward [m], shape (bodies,).
         body_inertia: Roll, pitch and yaw inertia [kg m^2], shape (bodies, 3).
-        K_leaning: Change of K where the train leans for long, in curves, shape (n, n) (:mod:`tiengine.vehicle.preload`).
+        K_leaning: Change of K where the train leans, in curves, shape (n, n) (:mod:`tiengine.vehicle.preload`).
         grade_force: Generalised force per unit g sin(gradient) at each body, shape (n, bodies).
         element_index: Coordinates of each nonlinear element, unused 0, shape (n_e, 12).
         element_row: Elongation = row . u, unused 0, shape (n_e, 12).
