@@ -28,7 +28,6 @@ Facts = dict[str, Any]
 CASES = tomllib.loads((Path(__file__).parent / "cases.toml").read_text(encoding="utf-8"))
 
 RAIL = 600.0  # m, of the full-length model
-MODES_PER_METRE = 2.0
 WARM_UP = 5.0  # m: the first launches load kernels
 
 
@@ -39,16 +38,18 @@ class Run:
     Attributes:
         words: Description.
         scenario: Built-in scenario.
+        distance: Distance of a whole measurement [m].
         settings: Overrides.
         workers: Number of processes.
-        slab_modes: Plate modes per slab of the full-length model; None for the engine.
+        modes_per_metre: Sines per metre of the full-length model; None for the engine.
     """
 
     words: str
     scenario: str
+    distance: float
     settings: dict[str, Any] = field(default_factory=dict)
     workers: int = 1
-    slab_modes: int | None = None
+    modes_per_metre: float | None = None
 
 
 RUNS = {name: Run(**table) for name, table in CASES["runs"].items()}
@@ -56,8 +57,7 @@ RUNS = {name: Run(**table) for name, table in CASES["runs"].items()}
 
 def settings_of(run: Run, distance: float) -> dict[str, Any]:
     """Overrides for a distance [m]."""
-    common: dict[str, Any] = CASES["common"]
-    return common | run.settings | {"train.distance": distance}
+    return run.settings | {"train.distance": distance}
 
 
 def perform(run: Run, distance: float) -> Facts:
@@ -78,10 +78,11 @@ def perform(run: Run, distance: float) -> Facts:
     scenario = load_scenario(run.scenario, settings_of(run, distance))
     with TemporaryDirectory(prefix="tiengine-speed-") as folder:
         path = Path(folder) / "run.h5"
-        if run.slab_modes is None:
+        if run.modes_per_metre is None:
             result = simulate(scenario, path, workers=run.workers)
         else:
-            numerics = FullLength(RAIL, MODES_PER_METRE, run.slab_modes, float(scenario.numerics.time_step))
+            slab_modes = scenario.parts.slab.plate_dofs  # all, as the window has them
+            numerics = FullLength(RAIL, run.modes_per_metre, slab_modes, float(scenario.numerics.time_step))
             result = run_full_length(scenario, numerics, path)
         with result:
             facts: Facts = result.attributes
@@ -90,15 +91,13 @@ def perform(run: Run, distance: float) -> Facts:
         return facts | {"file_mb": path.stat().st_size * 1e-6}
 
 
-def in_turn(
-    names: Sequence[str], rounds: int, distance: float, notify: Callable[[str], object]
-) -> dict[str, list[Facts]]:
+def in_turn(names: Sequence[str], rounds: int, share: float, notify: Callable[[str], object]) -> dict[str, list[Facts]]:
     """Run several, one after another, round by round.
 
     Args:
         names: Names of the runs.
         rounds: Number of repeats of each.
-        distance: Distance [m].
+        share: Part of each run's distance.
         notify: Called with a description of the next run.
 
     Returns:
@@ -115,7 +114,7 @@ def in_turn(
             for name, process in processes.items():
                 notify(f"{RUNS[name].words}, round {i + 1} of {rounds}")
                 before = _cpu_seconds()
-                found = process.submit(perform, RUNS[name], distance).result()
+                found = process.submit(perform, RUNS[name], share * RUNS[name].distance).result()
                 wall, own, everyone = (now - then for now, then in zip(_cpu_seconds(), before, strict=True))
                 facts[name].append(found | {"others_cores": max(everyone - own, 0.0) / wall})
     return facts
