@@ -16,6 +16,7 @@ from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import load_scenario
 from validation.frame.runs import Forces, full_length, simulate
 from validation.msm.simulate import FullLength
+from validation.speed.runs import step_of
 
 __all__ = ["Error", "accuracy", "difference", "enough"]
 
@@ -49,7 +50,7 @@ def accuracy(densities: list[float], distance: float) -> dict[str, Any]:
     way = (f"train.start={START}", f"train.distance={distance}", SAMPLES)
     fine = simulate("default", *way, "numerics.time_step=1e-4", f"numerics.window={WINDOW}", KNOTS)
     scenario, rail = load_scenario("default", way), distance + TRAIN + SPARE
-    modes, step = scenario.parts.slab.plate_dofs, float(scenario.numerics.time_step)
+    modes, step = scenario.parts.slab.plate_dofs, step_of(scenario)
     runs = {density: full_length("default", FullLength(rail, density, modes, step), *way) for density in densities}
     default = difference(simulate("default", *way), fine)
     full = {density: difference(run, fine) for density, run in runs.items()}

@@ -14,6 +14,7 @@ from tiengine.model.model import build_model
 from tiengine.scenario.scenario import Scenario
 from tiengine.simulation.tasks import Task
 from tiengine.simulation.time_loop import CHUNK_STEPS, LoopTimer, Run
+from validation.speed.runs import step_of
 
 __all__ = ["Bench", "timed_in_turn"]
 
@@ -54,7 +55,7 @@ class Bench:
             trains: Trains advanced together.
             steps: Steps in a block.
         """
-        given = replace(ingredients(scenario, float(scenario.numerics.time_step)), trains=trains)
+        given = replace(ingredients(scenario, step_of(scenario)), trains=trains)
         model = build_model(given, scenario.train.speed.fastest)
         seeds = range(trains)
         tracks = tuple(scenario.irregularity.model_copy(update={"seed": seed}) for seed in seeds)

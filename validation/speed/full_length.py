@@ -14,7 +14,7 @@ from typing import Any
 from validation.speed.accuracy import accuracy
 from validation.speed.effort import Effort
 from validation.speed.findings import Findings
-from validation.speed.runs import RAIL, RUNS, Facts, apart, median_of, settings_of
+from validation.speed.runs import RAIL, RUNS, Facts, apart, median_of, settings_of, step_of
 from validation.speed.throughput import factors, step_us
 
 __all__ = ["full_length", "profile_full_length"]
@@ -37,8 +37,9 @@ def full_length(effort: Effort, rounds: Mapping[str, Sequence[Facts]]) -> Findin
     """Measure ratios of real-time factors and the errors of both, and profile the full-length step."""
     one, batch, whole = (median_of(rounds[name], "real_time_factor") for name in ("default", "batch", "full"))
     density = RUNS["full"].modes_per_metre or 0.0
-    (errors,) = apart(accuracy, (list(effort.densities), ACCURACY_DISTANCE))
-    error = errors["full_length"][effort.densities.index(density)]["p99"]
+    densities = sorted({density, *effort.densities})
+    (errors,) = apart(accuracy, (densities, ACCURACY_DISTANCE))
+    error = errors["full_length"][densities.index(density)]["p99"]
     (profile,) = apart(profile_full_length, (density, PROFILE_STEPS))
     full, default = rounds["full"][0]["dofs"], rounds["default"][0]["dofs"]
     us, default_us = step_us(rounds["full"]), step_us(rounds["default"])
@@ -79,7 +80,7 @@ def profile_full_length(modes_per_metre: float, steps: int) -> dict[str, Any]:
 
     distance = 0.8 * RAIL
     scenario = load_scenario(RUNS["full"].scenario, settings_of(RUNS["full"], distance))
-    numerics = FullLength(RAIL, modes_per_metre, scenario.parts.slab.plate_dofs, float(scenario.numerics.time_step))
+    numerics = FullLength(RAIL, modes_per_metre, scenario.parts.slab.plate_dofs, step_of(scenario))
     with threadpool_limits(1):
         stepper = prepare(scenario, numerics, *(WARM_UP + steps,) * 2)
         start = scenario.rear + scenario.centre_in_window

@@ -21,7 +21,9 @@ from typing import Any, TypeVar
 
 import psutil
 
-__all__ = ["CASES", "RUNS", "Facts", "Run", "apart", "in_turn", "median_of", "perform", "settings_of"]
+from tiengine.scenario.scenario import Scenario
+
+__all__ = ["CASES", "RUNS", "Facts", "Run", "apart", "in_turn", "median_of", "perform", "settings_of", "step_of"]
 
 T = TypeVar("T")
 Facts = dict[str, Any]
@@ -60,6 +62,14 @@ def settings_of(run: Run, distance: float) -> dict[str, Any]:
     return run.settings | {"train.distance": distance}
 
 
+def step_of(scenario: Scenario) -> float:
+    """Time step of a run of ``cases.toml`` [s]; "auto" takes the longest, which their tracks and trains allow."""
+    from tiengine.engine.time_step import AUTO_STEPS  # imported here, since the parent starts no Taichi
+
+    wanted = scenario.numerics.time_step
+    return AUTO_STEPS[0] if wanted == "auto" else float(wanted)
+
+
 def perform(run: Run, distance: float) -> Facts:
     """Run in this process, into a temporary file.
 
@@ -82,7 +92,7 @@ def perform(run: Run, distance: float) -> Facts:
             result = simulate(scenario, path, workers=run.workers)
         else:
             slab_modes = scenario.parts.slab.plate_dofs  # all, as the window has them
-            numerics = FullLength(RAIL, run.modes_per_metre, slab_modes, float(scenario.numerics.time_step))
+            numerics = FullLength(RAIL, run.modes_per_metre, slab_modes, step_of(scenario))
             result = run_full_length(scenario, numerics, path)
         with result:
             facts: Facts = result.attributes
