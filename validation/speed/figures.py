@@ -26,7 +26,7 @@ OURS, FULL, OTHERS, BEST = (
 STAGE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
 
 MARKS = ("o", "s", "^")
-"""Of one car, many cars, eight cars."""
+"""Marks of one car, many cars, eight cars."""
 LEFT = 0.01  # start of the bars
 TICKS = [tick * 10**decade for decade in (0, 1, 2, 3) for tick in (1, 1.5, 2, 3, 5, 7)]
 
