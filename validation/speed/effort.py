@@ -20,7 +20,7 @@ class Effort:
         bench_rounds: Repeats of a block of steps in scaling curves.
         bench_steps: Steps in a block.
         bench_points: Points of each scaling curve; None for all.
-        densities: Sines per metre of the full-length model whose errors are measured beside those of the one compared.
+        full_length: Further numerics of the full-length model, sines per metre and step [s], whose errors are measured.
     """
 
     name: str
@@ -31,10 +31,13 @@ class Effort:
     bench_rounds: int
     bench_steps: int
     bench_points: int | None
-    densities: tuple[float, ...]
+    full_length: tuple[tuple[float, float], ...]
 
 
-DENSITIES = (3.0, 5.0, 6.5, 8.0, 10.0)
+FULL_LENGTH = (
+    (3.0, 2e-4), (5.0, 2e-4), (6.5, 2e-4), (8.0, 2e-4), (5.0, 1e-4), (6.5, 1e-4), (8.0, 1e-4), (10.0, 1e-4),
+    (6.5, 5e-5),
+)  # fmt: skip
 
 
 def effort(quick: bool, far: bool) -> Effort:
@@ -47,4 +50,4 @@ def effort(quick: bool, far: bool) -> Effort:
     if quick:
         return Effort("quick", 2, 0.2, 1, (0.25, 0.5, 1.0), 3, 50, 4, ())
     lengths = (5.0, 10.0, 20.0, 100.0) if far else (5.0, 10.0, 20.0)
-    return Effort("long" if far else "whole", 5, 1.0, 3, lengths, 7, 150, None, DENSITIES)
+    return Effort("long" if far else "whole", 5, 1.0, 3, lengths, 7, 150, None, FULL_LENGTH)

@@ -1,7 +1,7 @@
-"""Window against whole rails with the same integrator, time step and passes, at equal accuracy.
+"""Window against whole rails with the same integrator and passes, at equal accuracy.
 
-The full-length model gets as many sines per metre as it needs to be as accurate as the default numerics, or fewer;
-:mod:`validation.speed.accuracy` measures the errors of both.
+The full-length model gets the sines per metre and the time step that it needs to be as accurate as the default
+numerics, or less; :mod:`validation.speed.accuracy` measures the errors of both.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 from validation.speed.accuracy import accuracy
 from validation.speed.effort import Effort
 from validation.speed.findings import Findings
-from validation.speed.runs import RAIL, RUNS, Facts, apart, median_of, settings_of, step_of
+from validation.speed.runs import RAIL, RUNS, Facts, apart, median_of, settings_of
 from validation.speed.throughput import factors, step_us
 
 __all__ = ["full_length", "profile_full_length"]
@@ -36,16 +36,17 @@ TRANSFORMS, REST = "seats, sine transforms", "vehicle's solve and recording"
 def full_length(effort: Effort, rounds: Mapping[str, Sequence[Facts]]) -> Findings:
     """Measure ratios of real-time factors and the errors of both, and profile the full-length step."""
     one, batch, whole = (median_of(rounds[name], "real_time_factor") for name in ("default", "batch", "full"))
-    density = RUNS["full"].modes_per_metre or 0.0
-    densities = sorted({density, *effort.densities})
-    (errors,) = apart(accuracy, (densities, ACCURACY_DISTANCE))
-    error = errors["full_length"][densities.index(density)]["p99"]
-    (profile,) = apart(profile_full_length, (density, PROFILE_STEPS))
+    density, step = RUNS["full"].modes_per_metre or 0.0, float(rounds["full"][0]["time_step"])
+    numerics = list(dict.fromkeys([*effort.full_length, (density, step)]))
+    (errors,) = apart(accuracy, (numerics, ACCURACY_DISTANCE))
+    error = errors["full_length"][numerics.index((density, step))]["p99"]
+    (profile,) = apart(profile_full_length, (density, step, PROFILE_STEPS))
     full, default = rounds["full"][0]["dofs"], rounds["default"][0]["dofs"]
     us, default_us = step_us(rounds["full"]), step_us(rounds["default"])
     return Findings(
         {
             "modes_per_metre": density,
+            "time_step_us": 1e6 * step,
             "rtf": whole,
             "ratio_one": whole / one,
             "ratio_batch": whole / batch,
@@ -62,11 +63,12 @@ def full_length(effort: Effort, rounds: Mapping[str, Sequence[Facts]]) -> Findin
     )
 
 
-def profile_full_length(modes_per_metre: float, steps: int) -> dict[str, Any]:
+def profile_full_length(modes_per_metre: float, step: float, steps: int) -> dict[str, Any]:
     """Measure the stages of a full-length step by timers around its methods.
 
     Args:
         modes_per_metre: Sines per metre and field.
+        step: Time step [s].
         steps: Number of steps.
 
     Returns:
@@ -80,7 +82,7 @@ def profile_full_length(modes_per_metre: float, steps: int) -> dict[str, Any]:
 
     distance = 0.8 * RAIL
     scenario = load_scenario(RUNS["full"].scenario, settings_of(RUNS["full"], distance))
-    numerics = FullLength(RAIL, modes_per_metre, scenario.parts.slab.plate_dofs, step_of(scenario))
+    numerics = FullLength(RAIL, modes_per_metre, scenario.parts.slab.plate_dofs, step)
     with threadpool_limits(1):
         stepper = prepare(scenario, numerics, *(WARM_UP + steps,) * 2)
         start = scenario.rear + scenario.centre_in_window

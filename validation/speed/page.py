@@ -155,8 +155,8 @@ def _accuracy(data: Mapping[str, Any]) -> list[str]:
     found = data["accuracy"]
     named = [("default", found["default"])]
     named += [
-        (f"full length, {density:g} sines per metre", error)
-        for density, error in zip(found["densities"], found["full_length"], strict=True)
+        (f"full length, {density:g} sines per metre, {1e6 * step:g} µs", error)
+        for (density, step), error in zip(found["numerics"], found["full_length"], strict=True)
     ]
     body = [(words, f"{error['largest']:.2f}", f"{error['p99']:.2f}") for words, error in named]
     return _table(("run", "largest", "99th percentile"), body)
