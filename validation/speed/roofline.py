@@ -1,9 +1,8 @@
 """Stages of the spline step against the machine's roofline: one car, sixteen trains of one car, one train of eight.
 
-A stage runs in launches of its own, on the state that a run has left; the time of launches that do nothing is taken
-off. Contact needs fresh forward results, so it runs with the forward sweep, whose time is taken off as well. Caches
-are warmer than in the whole step, and contact needs fewer iterations than on a rail that moves: the stages are
-estimates, the whole step is not.
+A stage runs in launches of its own, on the state at the beginning of a block of steps; the time of launches that do
+nothing is taken off. Caches are warmer than in the whole step. The wheels, whose iterations need a state that moves,
+get what the other stages leave of launches that do everything, so that the stages add up to the kernel.
 """
 
 from __future__ import annotations
@@ -12,11 +11,16 @@ import time
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tiengine.engine.spline_stepper import SplineStepper
+from tiengine.kernels import spline_layout as at
 from tiengine.profiling.roofline import Roofs
+from validation.speed.bench import Bench, timed_in_turn
 from validation.speed.effort import Effort
 from validation.speed.findings import Findings
 from validation.speed.runs import RUNS, apart, settings_of
+from validation.speed.spline_work import STAGES, counts, sizes_of
 
 __all__ = ["GROUPS", "measured", "roofline"]
 
@@ -65,12 +69,9 @@ def measured(name: str, trains: int, rounds: int, steps: int) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits  # imported here, since the parent starts no Taichi
 
     from tiengine.engine import backend
-    from tiengine.engine.spline_stepper import SplineStepper
     from tiengine.profiling.machine import this_machine
     from tiengine.profiling.roofline import measure_roofs
     from tiengine.scenario.scenario import load_scenario
-    from validation.speed.bench import Bench, timed_in_turn
-    from validation.speed.spline_work import STAGES, counts, sizes_of
 
     backend.start()
     scenario = load_scenario(RUNS[name].scenario, settings_of(RUNS[name], WAY))
@@ -81,7 +82,7 @@ def measured(name: str, trains: int, rounds: int, steps: int) -> dict[str, Any]:
         steps_a_launch = bench.steps_a_launch(steps)
         stepper = bench.run.stepper
         assert isinstance(stepper, SplineStepper)
-        launch_us, times = stage_times(stepper, STAGES)
+        launch_us, times = stage_times(bench, STAGES)
         roofs = measure_roofs(machine.l2_bytes, machine.l3_bytes)
         work = counts(sizes_of(stepper))
     stages = [
@@ -112,37 +113,35 @@ def floor_us(flops: float, traffic: float, roofs: Roofs) -> float:
     return max(flops / roofs.dgemm_gflops, traffic / roofs.triad_l2_gb_per_s) * 1e-3
 
 
-def stage_times(stepper: Any, stages: dict[str, int]) -> tuple[float, dict[str, float]]:
+def stage_times(bench: Bench, stages: dict[str, int]) -> tuple[float, dict[str, float]]:
     """Time of a launch that does nothing [us], and of each stage in a step of the whole group [us].
 
     Args:
-        stepper: A spline stepper whose chunk is loaded; its state is left as it was.
+        bench: Trains in splines; they advance by a launch.
         stages: Bits of each stage by name.
     """
-    from tiengine.kernels import spline_layout as at
+    stepper = bench.run.stepper
+    assert isinstance(stepper, SplineStepper)
+    launch, arrays = stepper.launch, stepper.state.arrays()
+    before = {name: array.copy() for name, array in arrays.items()}
+    bench.block_us(LAUNCH_STEPS)  # fills the chunk with the track under these steps
+    after = {name: array.copy() for name, array in arrays.items()}
 
-    launch, state = stepper.launch, stepper.state
-    kept = {name: array.copy() for name, array in state.arrays().items()}
-    recorded = launch.record.copy()
-    launch.record[:] = -1
-    forward = at.FORWARD_STAGE
-    masks = {"nothing": 0} | {name: bits | forward * (bits == at.CONTACT_STAGE) for name, bits in stages.items()}
-    spent: dict[str, list[float]] = {name: [] for name in masks}
-    for _ in range(REPEATS):
-        for name, mask in masks.items():
-            launch.job[at.STAGES] = mask
+    def spent(mask: int, steps: int, state: dict[str, NDArray[Any]]) -> float:
+        launch.job[at.STAGES] = mask
+        for _ in range(2):  # the first fills the caches
+            for name, array in arrays.items():
+                array[...] = state[name]
             clock = time.perf_counter_ns()
-            launch(0, LAUNCH_STEPS)
-            spent[name].append((time.perf_counter_ns() - clock) * 1e-3)
-            for kind, array in state.arrays().items():
-                array[...] = kept[kind]
+            launch(0, steps)
+        return (time.perf_counter_ns() - clock) * 1e-3
+
+    others = {name: bits for name, bits in stages.items() if bits != at.CONTACT_STAGE}
+    masks = {"nothing": 0, "everything": at.ALL_STAGES, **others}
+    taken = [{name: spent(mask, LAUNCH_STEPS, before) for name, mask in masks.items()} for _ in range(REPEATS)]
+    launch_us = float(np.median([spent(0, 1, after) for _ in range(REPEATS)]))
     launch.job[at.STAGES] = at.ALL_STAGES
-    launch.record[:] = recorded
-    us = {name: float(np.median(times)) for name, times in spent.items()}
-    nothing = us.pop("nothing")
-    found = {name: max(0.0, time_us - nothing) / LAUNCH_STEPS for name, time_us in us.items()}
-    alone = next(found[name] for name, bits in stages.items() if bits == forward)
-    return nothing, {
-        name: max(0.0, time_us - alone) if stages[name] == at.CONTACT_STAGE else time_us
-        for name, time_us in found.items()
-    }
+    us = {name: float(np.median([each[name] for each in taken])) for name in masks}
+    found = {name: max(0.0, us[name] - us["nothing"]) / LAUNCH_STEPS for name in ("everything", *others)}
+    whole = found.pop("everything")
+    return launch_us, found | {"wheels": max(0.0, whole - sum(found.values()))}
