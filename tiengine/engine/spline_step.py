@@ -43,9 +43,9 @@ class Contact:
 
     Attributes:
         wheel: r0, b0, spin inertia, shape (W, 3).
-        table: Contact geometry, shape (n_u, n_alpha, N_TABLE).
-        contact: Contact states, shape (B, W, 2, N_CONTACT).
-        force: N, Fx, Fy, Mz on the wheels, shape (B, W, 2, 4).
+        table: Contact geometry, shape (n_u, n_alpha, N_TABLE patches).
+        contact: Contact states, shape (B, W, CONTACT_ROWS, N_CONTACT).
+        force: N, Fx, Fy, Mz on the wheels, shape (B, W, CONTACT_ROWS, 4).
         wheelset_force: On y, z, roll, pitch, yaw, shape (B, W, 5).
         rail_force: On w, v, theta_x, shape (B, W, 2, 3).
         iterations: Most Newton iterations, shape (B, W).
@@ -58,6 +58,11 @@ class Contact:
     wheelset_force: Floats
     rail_force: Floats
     iterations: Ints
+
+    @property
+    def patches(self) -> int:
+        """Patches a wheel can have."""
+        return self.table.shape[2] // layout.N_TABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +131,7 @@ class SplineStep:
             contact: Arrays of the contact.
             clock: Window at the end of each step, shape (steps, N_CLOCK).
             irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
-            wheel_record: Wheel output, shape (B, rows, W, 2, N_WHEEL).
+            wheel_record: Wheel output, shape (B, rows, W, 2, N_WHEEL_RECORD).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
             bed: Bed, read if MORTAR_MODE is not 0.
         """
@@ -158,7 +163,7 @@ class SplineStep:
                    cars.columns, cars.load)  # fmt: skip
         self.launch = VectorLaunch(
             step_kernel,
-            (state.lanes, slabs.half_width, cars.blocks),
+            (state.lanes, slabs.half_width, cars.blocks, contact.patches),
             arrays,
             frozenset(i for i, array in enumerate(arrays) if any(array is vector for vector in vectors)),
         )
