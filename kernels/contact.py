@@ -129,9 +129,9 @@ def state_of(
 @ti.func
 def feedback(
     same: Template, wheelset: int, V: float, constants: Array, D: Template, B: Template, R: Template,
-    other: Template, other_R: Template, cos: float, wheelset_compliance: Array, rail_coupling: Array,
+    other: Template, cos: float, wheelset_compliance: Array, rail_coupling: Array,
 ):  # fmt: skip
-    """D W for (N, Fx, Fy): response of the law of a patch to unit forces of one on its ``same`` or on the other wheel.
+    """D W for (N, Fx, Fy): response of the law of one wheel to unit forces of itself (``same``) or of the other wheel.
 
     W is the change of (delta, xi_x, xi_y). N and Fy move y, z and roll; Fx moves pitch and yaw, and yaw steers:
     -psi / cos gamma. The diagonal of the wheelset's compliance is enough, inertia dominates it.
@@ -143,15 +143,15 @@ def feedback(
             for k in ti.static(range(3)):
                 total += B[k, 2 * m] * wheelset_compliance[wheelset, k, k] * other[k, 2 * n]
             if ti.static(same == 1):
-                total += R[0, 2 * m] * rail_coupling[wheelset, 0, wheelset, 0, 0] * other_R[0, 2 * n]
+                total += R[0, 2 * m] * rail_coupling[wheelset, 0, wheelset, 0, 0] * R[0, 2 * n]
                 for k in ti.static(range(1, 3)):
                     for l in ti.static(range(1, 3)):
-                        total += R[k, 2 * m] * rail_coupling[wheelset, 0, wheelset, k, l] * other_R[l, 2 * n]
+                        total += R[k, 2 * m] * rail_coupling[wheelset, 0, wheelset, k, l] * R[l, 2 * n]
             if ti.static(m == 0):
                 W[m, n] = -constants[at.BETA_DT2] * total  # a wheel pushed up penetrates less
                 if ti.static(same == 1):
                     for k in ti.static(range(3)):
-                        W[m, n] -= R[k, 0] * constants[at.RESIDUAL_VERTICAL + k] * other_R[k, 2 * n]
+                        W[m, n] -= R[k, 0] * constants[at.RESIDUAL_VERTICAL + k] * R[k, 2 * n]
             else:
                 W[m, n] = constants[at.GAMMA_DT] / V * total
     pitch = B[3, 1] * wheelset_compliance[wheelset, 3, 3] * other[3, 1]
@@ -174,10 +174,10 @@ def newton_step(
     rail_coupling: Array,
 ):  # fmt: skip
     """Solve (I - D W) step = residual for (N, Fx, Fy) of the left, then of the right wheel."""
-    ll = feedback(1, wheelset, V, constants, D_l, B_l, R_l, B_l, R_l, cos_l, wheelset_compliance, rail_coupling)
-    lr = feedback(0, wheelset, V, constants, D_l, B_l, R_l, B_r, R_r, cos_l, wheelset_compliance, rail_coupling)
-    rl = feedback(0, wheelset, V, constants, D_r, B_r, R_r, B_l, R_l, cos_r, wheelset_compliance, rail_coupling)
-    rr = feedback(1, wheelset, V, constants, D_r, B_r, R_r, B_r, R_r, cos_r, wheelset_compliance, rail_coupling)
+    ll = feedback(1, wheelset, V, constants, D_l, B_l, R_l, B_l, cos_l, wheelset_compliance, rail_coupling)
+    lr = feedback(0, wheelset, V, constants, D_l, B_l, R_l, B_r, cos_l, wheelset_compliance, rail_coupling)
+    rl = feedback(0, wheelset, V, constants, D_r, B_r, R_r, B_l, cos_r, wheelset_compliance, rail_coupling)
+    rr = feedback(1, wheelset, V, constants, D_r, B_r, R_r, B_r, cos_r, wheelset_compliance, rail_coupling)
     J = ti.Matrix.identity(ti.f64, 6)
     for m in ti.static(range(3)):
         for n in ti.static(range(3)):

@@ -46,7 +46,7 @@ def lookup(u: float, alpha: float, table: Array, constants: Array, patch: Templa
         for n in range(4):
             weight = wx[m] * wy[n]
             for column in ti.static(range(at.N_TABLE)):
-                value[column] += weight * table[i + m - 1, j + n - 1, ti.static(patch * at.N_TABLE + column)]
+                value[column] += weight * table[i + m - 1, j + n - 1, patch * at.N_TABLE + column]
     return value
 
 

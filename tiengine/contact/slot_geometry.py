@@ -50,9 +50,8 @@ def raw_slots(pair: WheelRailPair, u: Reals, alpha: Reals, span: float) -> tuple
     ]
     return np.stack(geometry), slots.share, first.gap
 
-def smoothed_slots(
-    geometry: Reals, share: Reals, lowest: Reals, kernel: Reals
-) -> tuple[Reals, Reals, Reals]:
+
+def smoothed_slots(geometry: Reals, share: Reals, lowest: Reals, kernel: Reals) -> tuple[Reals, Reals, Reals]:
     """Smooth over u, and fill empty slots.
 
     Args:

@@ -48,10 +48,14 @@ WHEEL = {
 
 PATCH = {
     "normal_force": Channel("N", "normal force of the patch"),
-    "share": Channel("1", "part of the wheel's normal force that the patch carries, zero when the wheel has lifted off"),
+    "share": Channel(
+        "1", "part of the wheel's normal force that the patch carries, zero when the wheel has lifted off"
+    ),
     "contact_position_wheel": Channel("m", "position of the patch on the wheel, outward from the tape circle"),
     "contact_position_rail": Channel("m", "position of the patch on the rail, outward from the crown"),
-    "contact_angle": Channel("rad", "inclination of the patch to the track's plane, positive where the rail falls inward"),
+    "contact_angle": Channel(
+        "rad", "inclination of the patch to the track's plane, positive where the rail falls inward"
+    ),
     "longitudinal_creepage": Channel("1", "longitudinal creepage in the patch"),
     "lateral_creepage": Channel("1", "lateral creepage in the plane of the patch"),
     "spin_creepage": Channel("1/m", "spin creepage in the patch"),
