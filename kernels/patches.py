@@ -66,10 +66,11 @@ def one_at_given_motion(
 ):  # fmt: skip
     """Contact states and forces of a wheelset with one patch a wheel at given motions of it and its rails."""
     r0, b0, h_r = wheel[wheelset, 0], wheel[wheelset, 1], constants[at.ARM_HEAD]
+    rails = [left, right]
     q = ti.Vector.zero(ti.f64, 5)
     for side in ti.static(range(2)):
         state = ct.state_of(
-            side, V, r0, b0, x, dx, ti.static((left, right)[side]), irregularity, rolls, table, constants, 0
+            side, V, r0, b0, x, dx, rails[side], irregularity, rolls, table, constants, 0
         )
         f, _ = wr.contact_law(state, constants[at.FRICTION])
         B, R = wr.force_directions(ti.static(2.0 * side - 1.0), r0, b0, h_r, wr.placing(state))

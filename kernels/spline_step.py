@@ -67,7 +67,7 @@ def sweep_slabs(
 
 
 def step_kernel(lanes: int, K: int, blocks: int, patches: int) -> Any:
-    """Make the kernel for lanes of the rails, half width of the slabs' band, vectors a row of a car, patches a wheel."""
+    """Make the kernel for lanes of the rails, half width of the slabs' band, vectors a car's row, patches a wheel."""
     lane_vectors = ti.types.ndarray(dtype=ti.types.vector(lanes, ti.f64), ndim=1)
     eights = ti.types.ndarray(dtype=ti.types.vector(8, ti.f64), ndim=1)
     trains_a_chunk = lanes // 2

@@ -1,11 +1,11 @@
 """Two contact patches of a wheel in two slots whose geometry does not jump where load passes from one to the other.
 
 Where the gap has two minima that are patches (:mod:`tiengine.contact.search`), they swap order as the wheel moves: the
-lower one is the tread, then the flange. Slots are therefore told apart by place, not by order. Split stations divide the
-wheel, each between the two minima of such pairs, and minima on either side of a split are in different slots: field side
-and tread in the first, flange in the second, with more splits alternately. Each slot acts with a share of its patch's
-forces: 1 for the lower minimum, the second's own share for the other. A lone contact that moves across a split is in
-both slots at once, with shares that add up to 1; one that jumps across it likewise, once the shares are smoothed.
+lower one is the tread, then the flange. Slots are therefore told apart by place, not by order. Split stations divide
+the wheel, each between the two minima of such pairs, and minima on either side of a split are in different slots: the
+field side in the first, and alternately with every split. A slot acts with a share of its patch's forces: 1 for the
+lower minimum, the second's own share for the other. A lone contact that moves across a split is in both slots at once,
+with shares that add up to 1; one that jumps across it likewise, once the shares are smoothed.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ class Contact:
     @property
     def patches(self) -> int:
         """Patches a wheel can have."""
-        return self.table.shape[2] // layout.N_TABLE
+        return int(self.table.shape[2]) // layout.N_TABLE
 
 
 @dataclass(frozen=True, eq=False)

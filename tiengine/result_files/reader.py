@@ -209,7 +209,7 @@ class Reader:
         return self.group("wheel", train)
 
     def patch(self, train: int = 0) -> dict[str, NDArray[Any]]:
-        """Both patches of all wheels, with ``contact.patches = 2``; channels have shape (time, wheelset, side, patch)."""
+        """Patches of all wheels if ``contact.patches`` is 2; channels have shape (time, wheelset, side, patch)."""
         return self.group("patch", train)
 
     def body(self, train: int = 0) -> dict[str, NDArray[Any]]:

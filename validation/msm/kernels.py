@@ -351,7 +351,8 @@ def implicit_and_contact(
                 0, w, speed, wheelset_now(w, at.U, wheelset_dof, motion), wheelset_now(w, at.V, wheelset_dof, motion),
                 uw.stored_rail(0, w, 0, rail_free_out), uw.stored_rail(0, w, 1, rail_free_out), channels, dims,
                 constants, wheel, table, wheelset_compliance, rail_compliance_out, contact_out, force_out,
-                wheelset_force_out, rail_force_out, constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD], patches,
+                wheelset_force_out, rail_force_out, constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD],
+                patches,
             )  # fmt: skip
         keep_increments(wheelset_force_out, rail_force_out, wheelset_before_out, rail_before_out)
         add_wheels(constants, inverse, shape_out, rail_before_out, rails)
