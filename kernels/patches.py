@@ -69,9 +69,7 @@ def one_at_given_motion(
     rails = [left, right]
     q = ti.Vector.zero(ti.f64, 5)
     for side in ti.static(range(2)):
-        state = ct.state_of(
-            side, V, r0, b0, x, dx, rails[side], irregularity, rolls, table, constants, 0
-        )
+        state = ct.state_of(side, V, r0, b0, x, dx, rails[side], irregularity, rolls, table, constants, 0)
         f, _ = wr.contact_law(state, constants[at.FRICTION])
         B, R = wr.force_directions(ti.static(2.0 * side - 1.0), r0, b0, h_r, wr.placing(state))
         q = q + B @ f

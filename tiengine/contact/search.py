@@ -128,6 +128,8 @@ def find_second_contacts(
     case, station = _candidates(wheel, rail, shift, alpha, DEEPEST)
     apart = np.abs(station - first.s_w[case]) > 0.5 * NEAR
     case, station = case[apart], station[apart]
+    if case.size == 0:
+        return SecondContacts(np.zeros_like(u), first)
     ridge = _ridges(wheel, rail, shift[case], alpha[case], station, first.s_w[case])
     station = _refine(wheel, rail, shift[case], alpha[case], station)
     o, z = _placed(wheel, shift[case], alpha[case], station)
@@ -139,7 +141,7 @@ def find_second_contacts(
         * (1.0 - _rise(gap - first.gap[case], DEEP, DEEPEST))
     )
     order = np.lexsort((-gap, share > 0.0, case))
-    best = order[np.append(np.diff(case[order]) > 0, True)] if case.size else order  # the lowest that is a patch
+    best = order[np.append(np.diff(case[order]) > 0, True)]  # the lowest that is a patch
     best = best[share[best] > 0.0]
     parts = (gap, station, o, wheel.height(station), -rail.height(o, 1))
     found = [getattr(first, name).copy() for name in ("gap", "s_w", "s_r", "dz_w", "tan_gamma")]
