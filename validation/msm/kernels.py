@@ -365,6 +365,4 @@ def implicit_and_contact(
         update_vehicle(constants, motion)
         if tick[at.LAST_PASS] == 1:
             for w in range(dims[at.WHEELSETS]):
-                pt.record_wheels(
-                    0, w, tick[at.STEP], contact_out, force_out, rail_force_out, wheel_record_out, patches
-                )
+                pt.record_wheels(0, w, tick[at.STEP], contact_out, force_out, rail_force_out, wheel_record_out, patches)
