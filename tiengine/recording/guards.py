@@ -271,6 +271,6 @@ def climbing_shift(table: ContactTable) -> float:
     Args:
         table: Contact geometry.
     """
-    slope = table.values[:, table.values.shape[1] // 2, at.TAN_GAMMA]
+    slope = table.values[:, table.values.shape[1] // 2, at.TAN_GAMMA :: at.N_TABLE].max(axis=1)
     steep = np.flatnonzero(slope >= STEEPEST * slope.max())
     return float(table.u_min + min(int(steep[-1]) + 1, len(slope) - 2) * table.du)

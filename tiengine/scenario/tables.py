@@ -146,6 +146,11 @@ def _line(
 class Contact(Params):
     """Wheel-rail contact."""
 
+    patches: Annotated[
+        Literal[1, 2],
+        Field(description="contact patches a wheel can have; 2 lets tread and flange carry load at the same time"),
+    ] = 1
+
     hertz: Annotated[
         Literal["exact", "zhai_worn", "zhai_cone"],
         Field(description="approach by Hertz from the curvatures, or by Zhai's formulas for worn or conical treads"),
