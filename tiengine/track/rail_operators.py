@@ -138,7 +138,11 @@ class RailOperators:
         flow = _diagonal([mu * f.flow for mu, f in fields])
         softening = _diagonal([mu * f.slopes for mu, f in fields])
         entry = _diagonal([mu * f.entry for mu, f in fields])
-        return M, sp.csr_array(V * entry - 2.0 * V * flow), sp.csr_array(interleaved(K) - V**2 * softening - V_rate * flow)
+        return (
+            M,
+            sp.csr_array(V * entry - 2.0 * V * flow),
+            sp.csr_array(interleaved(K) - V**2 * softening - V_rate * flow),
+        )
 
 
 def _diagonal(blocks: Sequence[sp.csr_array]) -> sp.csr_array:
