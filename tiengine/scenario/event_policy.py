@@ -16,7 +16,7 @@ class Events(Params):
         derailment: A wheel has left the contact table on the flange side; forces are no longer valid.
         flange_climb: The contact has passed the steepest part of the flange.
         wheel_lift: A wheel is unloaded for ``wheel_lift_time``.
-        oscillation: Wheel forces alternate from step to step for 0.1 s: the time step is unstable.
+        oscillation: Wheel forces alternate from step to step and grow, or stay large: the time step is unstable.
         track_end: The leading wheel reaches the end of a measured track; the track is smooth beyond it.
     """
 
