@@ -23,7 +23,7 @@ from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.state import DISPLACEMENT, VELOCITY, State
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.stepper import Plan, Stepper
 from tiengine.engine.vector_mode import lanes_for
 from tiengine.model.constant_data import MassAndStiffness, Model, shared_arrays
 from tiengine.model.ingredients import Ingredients, SlabDesigns
@@ -53,7 +53,7 @@ BEATING = 1.05
 OVERFLOW = 1e8
 """Squared disturbance over that at the start at which a trial ends."""
 INFINITE = 1e300  # that of numbers that have run away
-CHECKED = 20  # steps from one check for this to the next
+CHECKED = 20  # steps from one check for this to the next, in one launch
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ def with_stiffest_seats(ingredients: Ingredients, factor: float) -> Ingredients:
 
 
 def of_trains(model: Model, trains: int) -> Model:
-    """The same model for another number of trains: only sizes differ, all else is shared."""
-    ingredients = replace(model.ingredients, trains=trains)
+    """The same model for another number of trains, on straight level track: only sizes differ, all else is shared."""
+    ingredients = replace(model.ingredients, trains=trains, given=())
     return replace(model, ingredients=ingredients, dims=shared_arrays(ingredients)["dims"])
 
 
@@ -164,7 +164,7 @@ class _Trial:
         """Begin; none if there is no steady rolling to disturb."""
         g = model.ingredients
         state = state_at_rest(model, lanes)
-        stepper = make_stepper(model, state, Chunk.empty(g, steps, 1, 1))
+        stepper = make_stepper(model, state, Chunk.empty(g, steps, 1))
         # a slow train also meets all places of the seats
         trial = cls(
             stepper, _Energy(matrices, state), V, max(V * g.newmark.dt, g.slab.fastening_pitch / (3 * steps)), steps
@@ -181,18 +181,19 @@ class _Trial:
             return INFINITE
         if self.done:
             self._load()
-        peak, energy = 0.0, self.energy
+        sampled = self.steps - SAMPLED
         with np.errstate(all="ignore"):
-            for i in range(self.steps):
-                self.stepper.step(i)
-                if i >= self.steps - SAMPLED:
-                    peak = max(peak, energy())
-                elif i % CHECKED == 0:
-                    grown = energy.grown()
-                    if not grown < OVERFLOW:
-                        rate = 0.5 * np.log(grown if np.isfinite(grown) else INFINITE) / (self.done + i + 1)
-                        self.overflow = Growth(float(rate), 0.0)
-                        return INFINITE
+            for first in range(0, sampled, CHECKED):
+                self._take(first, min(first + CHECKED, sampled))
+                grown = self.energy.grown()
+                if not grown < OVERFLOW:
+                    rate = 0.5 * np.log(grown if np.isfinite(grown) else INFINITE) / (self.done + first + CHECKED)
+                    self.overflow = Growth(float(rate), 0.0)
+                    return INFINITE
+            peak = 0.0
+            for i in range(sampled, self.steps):
+                self._take(i, i + 1)
+                peak = max(peak, self.energy())
         self.done += self.steps
         return peak
 
@@ -202,6 +203,11 @@ class _Trial:
         with np.errstate(all="ignore"):
             rate = 0.5 * np.log(later / earlier) / apart
         return Growth(float(rate) if np.isfinite(rate) else np.inf, 0.5 * float(np.log(BEATING)) / apart)
+
+    def _take(self, first: int, end: int) -> None:
+        steps = np.arange(first, end)
+        nothing = np.full(len(steps), -1)
+        self.stepper.take(Plan(steps, nothing, nothing))
 
     def _load(self) -> None:
         chunk, count = self.stepper.chunk, self.steps
