@@ -77,7 +77,7 @@ class SeatPasses:
 
         Smeared and discrete seats are the same to them, so that nothing is left with the factor 1.
         """
-        share = max(self.impedance) / (self.spacing * self.operators.rail.densities[0])
+        share: float = max(self.impedance) / (self.spacing * self.operators.rail.densities[0])
         return (self.factor - 1.0) * share / (1.0 + self.factor * share)
 
     @cached_property
