@@ -14,9 +14,10 @@ from tiengine.kernels import layout as at
 from tiengine.kernels.types import Array, Template
 
 # Contact state of a wheel: results of geometry and kinematics for the law and the force directions.
-(DELTA, XI_X, XI_Y, XI_S, SIN, COS, S_W, S_R, R_C, KH, K11, K22, K23, K33, SHIFT, Z_IRR, Y_IRR, RAIL_W, N_CONTACT) = (
-    range(19)
-)
+(
+    DELTA, XI_X, XI_Y, XI_S, SIN, COS, S_W, S_R, R_C, KH, K11, K22, K23, K33, SHIFT, Z_IRR, Y_IRR, RAIL_W, TILT,
+    N_CONTACT,
+) = range(20)  # fmt: skip
 
 THIRD_OF_EXPONENTS = 715094163 << 32
 """Two thirds of the bias of a double's exponent, less what makes the first cube root's error least."""
@@ -147,6 +148,7 @@ def contact_state(
             z_irr,
             y_irr,
             w,
+            alpha,
         ]
     )
 
