@@ -294,7 +294,7 @@ def test_a_signal_may_come_in_the_middle_of_printing(capfd):
         def print(self, *_: object) -> None:
             raise RuntimeError("reentrant call")
 
-    with cli_run._stopped_by_signals(Busy()) as stop:
+    with cli_run.stopped_by_signals(Busy()) as stop:
         os.kill(os.getpid(), signal.SIGTERM)
         assert stop.number == signal.SIGTERM
     assert "a second signal exits at once" in capfd.readouterr().err
