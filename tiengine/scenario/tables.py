@@ -211,7 +211,7 @@ class Numerics(Params):
         Literal["cover", "paper"], Field(description="slabs under the whole window, or the source paper's count")
     ] = "cover"
     threads: Annotated[
-        int, Q("-", "threads of Taichi's loop over trains, with sines; all else uses one", ge=1, le=1024)
+        int, Q("-", "threads of Taichi's loop over trains; 1 with splines", ge=1, le=1024)
     ] = 1
 
     def modes(self, window: float) -> int:
