@@ -8,9 +8,9 @@ from pydantic import ValidationError
 from scipy.signal import welch
 from scipy.stats import chi2
 
+from tiengine.irregularity.patch_filter import PATCH_HALF_LENGTH
 from tiengine.irregularity.irregularity import (
     HALF_BASE,
-    PATCH_HALF_LENGTH,
     IrregularityParams,
     at_wheels,
     make_irregularity,

@@ -19,7 +19,7 @@ class Chunk:
 
     Attributes:
         clock: Window at the end of each step, shape (steps, N_CLOCK).
-        irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
+        irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
         wheel: Recorded wheel output, shape (B, rows, W, 2, N_WHEEL).
         body: Recorded displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
         mortar: Largest and smallest pressure of each slab [Pa], with the bodies, shape (B, rows, slots, 2).
@@ -38,7 +38,7 @@ class Chunk:
         W, bodies = len(train.wheelset_x), len(train.body_names)
         return cls(
             clock=np.zeros((steps, at.N_CLOCK)),
-            irregularity=np.zeros((B, steps, W, at.N_IRREGULARITY)),
+            irregularity=np.zeros((B, steps, W, ingredients.channels)),
             wheel=np.zeros((B, max(wheel_rows, 1), W, 2, at.N_WHEEL)),
             body=np.zeros((B, max(body_rows, 1), 3, 5 * bodies)),
             mortar=np.zeros((B, max(body_rows, 1), ingredients.slots, 2)),

@@ -42,7 +42,7 @@ class Contact:
     """Arrays that the contact solve reads and leaves, shapes as ``engine.sine_state`` and ``model.model`` have them.
 
     Attributes:
-        wheel: r0, b0, spin inertia, shape (W, 3).
+        wheel: Numbers of each wheelset, shape (W, N_WHEEL_NUMBERS).
         table: Contact geometry, shape (n_u, n_alpha, N_TABLE).
         contact: Contact states, shape (B, W, 2, N_CONTACT).
         force: N, Fx, Fy, Mz on the wheels, shape (B, W, 2, 4).
@@ -125,7 +125,7 @@ class SplineStep:
             suspension: Nonlinear elements.
             contact: Arrays of the contact.
             clock: Window at the end of each step, shape (steps, N_CLOCK).
-            irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
+            irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
             wheel_record: Wheel output, shape (B, rows, W, 2, N_WHEEL).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
             bed: Bed, read if MORTAR_MODE is not 0.
@@ -158,7 +158,7 @@ class SplineStep:
                    cars.columns, cars.load)  # fmt: skip
         self.launch = VectorLaunch(
             step_kernel,
-            (state.lanes, slabs.half_width, cars.blocks),
+            (state.lanes, slabs.half_width, cars.blocks, int(irregularity.shape[-1] > layout.N_IRREGULARITY)),
             arrays,
             frozenset(i for i, array in enumerate(arrays) if any(array is vector for vector in vectors)),
         )

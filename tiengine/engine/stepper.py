@@ -143,7 +143,7 @@ class Stepper(ABC):
             X: Chainage of the window's rear end at the end of each step [m], shape (steps,).
             V: Speed [m/s].
             V_rate: Its rate [m/s^2].
-            irregularity: Track channels, shape (B, steps, W, N_IRREGULARITY).
+            irregularity: Track channels, shape (B, steps, W, channels).
         """
         clock = window_clock(self.ingredients.slab, X, V, V_rate, self.ingredients.seat_reach)
         self.chunk.clock[: len(X)] = clock

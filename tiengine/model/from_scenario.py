@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table_cache import contact_table
+from tiengine.irregularity.wheel_shapes import wheel_tables
 from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.model.newmark import Newmark
 from tiengine.scenario.contact_settings import contact_settings
@@ -30,7 +31,7 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         InputError: Parts that do not fit together.
     """
     parts, numerics = scenario.parts, scenario.numerics
-    asked = scenario.train
+    asked, shapes = scenario.train, scenario.train.wheel_shapes
     train = assemble(parts.vehicles, parts.centres, series_springs=asked.series_springs or None, effort=asked.effort)
     return Ingredients(
         rail=parts.rail,
@@ -52,6 +53,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         local_compliance=numerics.truncation == "local",
         absorbing_zone=numerics.absorbing_zone,
         explicit_mortar=numerics.mortar == "explicit",
+        shaped=bool(shapes or scenario.track.rail_shapes),
+        out_of_round=wheel_tables(shapes, parts.wheel_radii) if shapes else None,
     )
 
 

@@ -66,6 +66,11 @@ class Parts:
         return np.concatenate(rows)
 
     @property
+    def wheel_radii(self) -> tuple[float, ...]:
+        """r0 of every wheelset, the leading one first [m]."""
+        return tuple(v.wheel_radius for v in self.vehicles for _ in v.axle_positions)
+
+    @property
     def wheel_span(self) -> float:
         """Distance between the outer wheelsets [m]."""
         return float(np.ptp(self.wheelset_positions))

@@ -17,14 +17,17 @@ import tomli_w
 from pydantic import Field
 
 from tiengine.irregularity.irregularity import IrregularityParams
+from tiengine.irregularity.rail_shapes import check_rail_shapes
 from tiengine.irregularity.track_checks import check_wave
+from tiengine.irregularity.wheel_shapes import check_wheel_shapes
 from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
-from tiengine.parameters.input_files import load_toml, to_tuples, user_path
+from tiengine.parameters.input_files import load_toml, to_tuples
 from tiengine.parameters.presets import find_preset
 from tiengine.parameters.quantity import Params, PlainName, Source, build
 from tiengine.scenario.ensemble import Ensemble
 from tiengine.scenario.event_policy import Events
+from tiengine.scenario.file_paths import absolute_files, absolute_vary
 from tiengine.scenario.gauges import Gauge, check_gauges
 from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
@@ -128,9 +131,9 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
         path = find_preset("scenarios", str(source), called="scenario")
         folder, tables = path.parent, load_toml(path)
         tables.setdefault("name", path.stem)
-    tables = _absolute(apply_overrides(tables, overrides, Scenario), folder)
+    tables = absolute_files(apply_overrides(tables, overrides, Scenario), folder)
     scenario = build(Scenario, tables)
-    ensemble = _absolute_vary(scenario.ensemble, folder)
+    ensemble = absolute_vary(scenario.ensemble, folder)
     presets = collect_presets(scenario.train, scenario.track, scenario.presets, folder)
     if ensemble.vary:
         for i in range(ensemble.different):
@@ -192,29 +195,6 @@ def _is_random(track: IrregularityParams) -> bool:
     return track.short_wave or track.has_spectrum
 
 
-def _absolute_vary(ensemble: Ensemble, folder: Path | None) -> Ensemble:
-    """The ensemble with the paths of measured irregularities made absolute."""
-    files = ensemble.vary.get("irregularity.file")
-    if files is None:
-        return ensemble
-    found = tuple(_absolute({"irregularity": {"file": file}}, folder)["irregularity"]["file"] for file in files)
-    return ensemble.model_copy(update={"vary": {**ensemble.vary, "irregularity.file": found}})
-
-
-def _absolute(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
-    """The tables with the path of a measured irregularity made absolute, since it is read at every run."""
-    irregularity = tables.get("irregularity")
-    if not isinstance(irregularity, dict) or not isinstance(irregularity.get("file"), str):
-        return tables
-    name = irregularity["file"]
-    path = user_path(name, folder, "irregularity.file")
-    try:
-        path = path.resolve()
-    except (OSError, RuntimeError) as error:  # circular links
-        raise InputError(f"irregularity.file = {name!r}: {error}") from None
-    return {**tables, "irregularity": {**irregularity, "file": str(path)}}
-
-
 def to_toml(scenario: Scenario) -> str:
     """Write the resolved scenario as TOML: every default and every preset used; it loads back equal.
 
@@ -234,6 +214,7 @@ def _check(scenario: Scenario) -> None:
             f" (wheels over {parts.wheel_span:g} m and {WINDOW_MARGIN_LEAST:g} m at either end)"
         )
     _check_trial_functions(scenario)
+    _check_shapes(scenario)
     duration = scenario.train.distance / min(scenario.train.speed.speed)
     if duration > LONGEST_RUN:
         raise InputError(
@@ -270,6 +251,17 @@ def _check(scenario: Scenario) -> None:
     check_gauges(
         scenario.gauges, begin=scenario.rear, end=scenario.rear + scenario.train.distance + window, slab=parts.slab
     )
+
+
+def _check_shapes(scenario: Scenario) -> None:
+    """Check that shapes of rails and wheels belong to rails and wheels of the run, and that its step knows them."""
+    rails, wheels = scenario.track.rail_shapes, scenario.train.wheel_shapes
+    begin = scenario.rear + scenario.centre_in_window + float(scenario.parts.wheelset_positions.max())
+    check_rail_shapes(rails, begin=begin, end=begin + scenario.train.distance)
+    check_wheel_shapes(wheels, len(scenario.parts.wheelset_positions))
+    for key, given in (("track.rail_shapes", rails), ("train.wheel_shapes", wheels)):
+        if given and scenario.numerics.trial_functions == "sines":
+            raise InputError(f'{key}: must be left out with numerics.trial_functions = "sines"; splines know them')
 
 
 def _check_trial_functions(scenario: Scenario) -> None:

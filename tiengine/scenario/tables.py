@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from tiengine.irregularity.rail_shapes import RailShape
+from tiengine.irregularity.wheel_shapes import WheelShape
 from tiengine.parameters.quantity import Params, Q
 from tiengine.result_files.channels import BODY, IRREGULARITY, WHEEL
 from tiengine.scenario.key_checks import channel_names, check_speed, number_or
@@ -23,6 +25,7 @@ from tiengine.vehicle.speed_programme import SpeedProfile
 __all__ = ["Contact", "Numerics", "Output", "Track", "Train"]
 
 MOST_DEFECTS = 10_000  # of each kind
+MOST_SHAPES = 1000  # of rails, of wheels
 
 
 class Train(Params):
@@ -61,7 +64,9 @@ class Train(Params):
         bool,
         Field(description="springs in series with dampers (k_series) are modelled; a vehicle may also set this itself"),
     ] = False
-
+    wheel_shapes: Annotated[
+        tuple[WheelShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)
+    ] = ()
     effort: Annotated[
         Effort,
         Field(
@@ -106,6 +111,7 @@ class Track(Params):
     mortar_voids: Annotated[
         tuple[MortarVoid, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
+    rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
 
 
 class Contact(Params):
