@@ -72,7 +72,7 @@ MOTION_ROWS = 7
 (POSITION, SPEED, SPEED_RATE, FIRST_SEAT_S, FIRST_SEAT, FIRST_SLAB, N_CLOCK) = range(7)
 
 # Entries of ``tick`` (int32): step, pass and record of a launch.
-(STEP, PASS, LAST_PASS, WHEEL_RECORD, N_TICK) = range(5)
+(STEP, PASS, LAST_PASS, N_TICK) = range(4)
 
 # Channels of the irregularity at a wheelset: track values and their slopes along x.
 (Z_V, Y_A, CROSS_LEVEL, GAUGE, Z_V_SLOPE, Y_A_SLOPE, CROSS_LEVEL_SLOPE, GAUGE_SLOPE, N_IRREGULARITY) = range(9)

@@ -82,7 +82,7 @@ def step_kernel(lanes: int, K: int, blocks: int, shaped: int) -> Any:
     @ti.kernel
     def spline_steps(
         job: Ints1,
-        record: Ints2,
+        record: Ints1,
         size: Ints1,
         dims: Ints1,
         constants: Reals1,
@@ -222,7 +222,7 @@ def step_kernel(lanes: int, K: int, blocks: int, shaped: int) -> Any:
                     tolerance, row = ct.ITERATE_TOLERANCE * constants[layout.STATIC_LOAD], -1
                     if last_pass == 1:
                         tolerance = constants[layout.CONTACT_TOLERANCE] * constants[layout.STATIC_LOAD]
-                        row = record[step, 0]
+                        row = step
                     for b in range(b0, b_end):
                         wheels.contact_of_train(
                             b, c, 2 * (b - b0), step, V, tolerance, row, dims, constants, wheel_place,
@@ -238,10 +238,10 @@ def step_kernel(lanes: int, K: int, blocks: int, shaped: int) -> Any:
                         cars.correct(car, i * at.CAR_ROWS * blocks, beta_dt2, gamma_dt, blocks)
                         if ahead == 1:
                             cars.predict(car, i * at.CAR_ROWS * blocks, constants, blocks)
-                    if last_pass == 1 and record[step, 1] >= 0:
+                    if last_pass == 1 and record[step] >= 0:
                         for b in range(b0, b_end):
                             cars.record_bodies(
-                                b, record[step, 1], b * train_car * 8, vehicle_place, car, body_record, blocks
+                                b, record[step], b * train_car * 8, vehicle_place, car, body_record, blocks
                             )
                 if stages & at.EXCHANGE_STAGE:
                     seats.loads_on_slabs(c, trains_a_chunk, size, dims, seat_place, seat, slab_seat)

@@ -233,6 +233,6 @@ def forces_and_contact(
                 )  # fmt: skip
                 uw.add_wheelset_force(b, w, 1.0, dims, wheelset_dof, wheelset_force, motion)
                 iterations_out[b, w] = ti.max(iterations_out[b, w], count)
-                if tick[at.LAST_PASS] == 1 and tick[at.WHEEL_RECORD] >= 0:
-                    ct.record_wheels(b, w, tick[at.WHEEL_RECORD], contact, force, rail_force, wheel_record_out)
+                if tick[at.LAST_PASS] == 1:
+                    ct.record_wheels(b, w, tick[at.STEP], contact, force, rail_force, wheel_record_out)
             uw.add_rail_forces(b, dims, wheel_shape, rail_force, motion)

@@ -20,7 +20,7 @@ class Chunk:
     Attributes:
         clock: Window at the end of each step, shape (steps, N_CLOCK).
         irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
-        wheel: Recorded wheel output, shape (B, rows, W, 2, N_WHEEL).
+        wheel: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL).
         body: Recorded displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
         mortar: Largest and smallest pressure of each slab [Pa], with the bodies, shape (B, rows, slots, 2).
     """
@@ -32,14 +32,14 @@ class Chunk:
     mortar: Reals
 
     @classmethod
-    def empty(cls, ingredients: Ingredients, steps: int, wheel_rows: int, body_rows: int) -> Chunk:
-        """Buffers for ``steps`` steps of which some are recorded."""
+    def empty(cls, ingredients: Ingredients, steps: int, body_rows: int) -> Chunk:
+        """Buffers for ``steps`` steps, some of which record the bodies."""
         train, B = ingredients.train, ingredients.trains
         W, bodies = len(train.wheelset_x), len(train.body_names)
         return cls(
             clock=np.zeros((steps, at.N_CLOCK)),
             irregularity=np.zeros((B, steps, W, ingredients.channels)),
-            wheel=np.zeros((B, max(wheel_rows, 1), W, 2, at.N_WHEEL)),
+            wheel=np.zeros((B, steps, W, 2, at.N_WHEEL)),
             body=np.zeros((B, max(body_rows, 1), 3, 5 * bodies)),
             mortar=np.zeros((B, max(body_rows, 1), ingredients.slots, 2)),
         )

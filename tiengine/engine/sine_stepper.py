@@ -86,10 +86,10 @@ class SineStepper(Stepper):
 
     def _enter(self) -> None:
         """Begin a step: let seats and slabs in and out where they change."""
-        i, wheel_row, _ = self.rows
+        i = self.rows.step
         if self.moves[i]:
             self.move(i)
-        self._tick[:, _ROWS] = i, wheel_row
+        self._tick[:, at.STEP] = i
 
     def _predict(self) -> Iterator[Stage]:
         """Predictors; shapes of the seats at their places at the end, factors of the products, rails under wheels."""
@@ -280,4 +280,3 @@ def _product(factor: NDArray[np.float64], matrix: NDArray[np.float64], out: NDAr
 _BLOCKS = ("vertical", "lateral", "slabs", "vehicles")
 _PREDICTED = np.array([at.U_PREDICTED, at.V_PREDICTED], dtype=np.int32)
 _ITERATE = np.array([at.U, at.V], dtype=np.int32)
-_ROWS = [at.STEP, at.WHEEL_RECORD]

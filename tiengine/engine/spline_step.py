@@ -89,7 +89,7 @@ class SplineStep:
     Attributes:
         state: What is advanced, in place.
         job: First step, number of steps, stages (``spline_layout``) of the next launch.
-        record: Rows of the wheels' and of the bodies' record that each step fills, -1 for none, shape (steps, 2).
+        record: Row of the bodies' record that each step fills, -1 for none, shape (steps,).
         launch: The bound kernel; ``launch.vector_mode`` tells how it was compiled.
     """
 
@@ -126,7 +126,7 @@ class SplineStep:
             contact: Arrays of the contact.
             clock: Window at the end of each step, shape (steps, N_CLOCK).
             irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
-            wheel_record: Wheel output, shape (B, rows, W, 2, N_WHEEL).
+            wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
             bed: Bed, read if MORTAR_MODE is not 0.
         """
@@ -138,7 +138,7 @@ class SplineStep:
         size[at.CARS], size[at.CAR_DOFS], size[at.ELEMENTS] = len(cars.car), cars.dofs, len(suspension.kind)
         self.state, self.size = state, size
         self.job = np.array([0, 1, at.ALL_STAGES], dtype=np.int32)
-        self.record = np.full((len(clock), 2), -1, dtype=np.int32)
+        self.record = np.full(len(clock), -1, dtype=np.int32)
         arrays = (
             self.job, self.record, size, dims, constants, clock,
             state.rail, rails.coefficient,

@@ -9,11 +9,15 @@ import numpy as np
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.spline_state import SplineState
 from tiengine.engine.spline_step import SplineStep, Suspension
-from tiengine.engine.stepper import Stage, Stepper
+from tiengine.engine.stepper import Plan, Rows, Stage, Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.spline_model import SplineModel
+from tiengine.parameters.arrays import Flags
 
 __all__ = ["SplineStepper"]
+
+Window = tuple[int, int]
+"""Rear seat and slab."""
 
 REFACTOR = 1e-3
 """Relative change of speed at which the tables that depend on it are made again; in between the convective terms of
@@ -50,7 +54,7 @@ class SplineStepper(Stepper):
         self._compiled = self.launch.launch.compile_seconds
         self.factored_speed = float("nan")
         self._window = (-1, -1)
-        self._pending = 0
+        self._first = 0
         self._explicit_bed = int(model.dims[at.MORTAR_MODE]) > 0
         rows, dofs = chunk.body.shape[1], state.tables.slabs.dofs
         groups = -(-state.slots // 8)
@@ -58,11 +62,32 @@ class SplineStepper(Stepper):
         self._design = np.zeros((rows, state.slots), dtype=np.int64)
         self.bind()
 
-    @property
-    def seat_extremes_due(self) -> bool:
-        """Whether the seats move on before the next step, or the chunk ends: the launch keeps extremes until then."""
-        coming = self.rows.step + 1
-        return coming >= len(self.moves) or self._changes(coming) != (False, False)
+    def seat_extremes_due(self, plan: Plan) -> Flags:
+        """Steps after which the seats move on, and the last of a chunk: launches keep the extremes until then."""
+        due = np.ones(len(self.moves) + 1, dtype=np.bool_)
+        window, factored = self._window, self.factored_speed
+        for i in np.flatnonzero(self.moves).tolist():
+            if i >= plan.step[0]:
+                due[i], window, factored = self._changes(i, window, factored)
+        due[:-1] &= self.moves
+        return due[plan.step + 1]
+
+    def take(self, plan: Plan) -> None:
+        """Take the planned steps, each launch up to the next one after which something reads the state."""
+        due = [each(plan) for each in self.due]
+        reads = np.logical_or.reduce([plan.body >= 0, self.seat_extremes_due(plan), *due])
+        reads[-1:] = True
+        first = 0
+        for last in np.flatnonzero(reads).tolist():
+            self._first, self.rows = int(plan.step[first]), Rows(*(int(values[last]) for values in plan))
+            self.launch.record[plan.step[first : last + 1]] = plan.body[first : last + 1]
+            self.call((*self.stages, *(w for w, each in zip(self.watchers, due, strict=True) if each[last])))
+            first = last + 1
+
+    def step(self, i: int, wheel_row: int = -1, body_row: int = -1) -> None:
+        """Take one step."""
+        self._first, self.launch.record[i] = i, body_row
+        super().step(i, wheel_row, body_row)
 
     def _stages(self) -> Iterator[Stage]:
         """Stages of the step in their order; :mod:`tiengine.kernels.spline_step` gives the equations."""
@@ -72,31 +97,32 @@ class SplineStepper(Stepper):
 
     def _enter(self) -> None:
         """Let seats and slabs in and out where they change; factorise again when the speed has changed enough."""
-        window, speed = self._changes(self.rows.step)
-        clock = self.chunk.clock[self.rows.step]
-        if window:
-            self._window = int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])
-            self.state.enter(*self._window)
-        if speed:
-            self.factor(float(clock[at.SPEED]))
+        if not self.moves[self._first]:
+            return
+        _, window, V = self._changes(self._first, self._window, self.factored_speed)
+        if window != self._window:
+            self._window = window
+            self.state.enter(*window)
+        if V != self.factored_speed:
+            self.factor(V)
 
-    def _changes(self, i: int) -> tuple[bool, bool]:
-        """Whether seats or slabs move on, and whether tables are to be made for another speed, before step ``i``."""
-        if not self.moves[i]:
-            return False, False
-        clock, factored = self.chunk.clock[i], self.factored_speed
-        V = float(clock[at.SPEED])
-        window = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])) != self._window
-        return window, V != factored and not abs(V - factored) < REFACTOR * factored
+    def _changes(self, i: int, window: Window, factored: float) -> tuple[bool, Window, float]:
+        """Whether anything changes before step ``i``, its rear seat and slab, the speed that its tables are made for.
+
+        Args:
+            i: Row of the chunk.
+            window: Rear seat and slab before it.
+            factored: Speed that the tables were made for before it [m/s].
+        """
+        clock = self.chunk.clock[i]
+        moved, V = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])), float(clock[at.SPEED])
+        if abs(V - factored) < REFACTOR * factored:
+            V = factored
+        return moved != window or V != factored, moved, V
 
     def _advance(self) -> None:
-        """Take this step, with those put off before it, unless nothing reads the state after it."""
-        i, wheel_row, body_row = self.rows
-        self.launch.record[i] = wheel_row, body_row
-        self._pending += 1
-        if body_row >= 0 or self.watched or self.seat_extremes_due:
-            self.launch(i + 1 - self._pending, self._pending)
-            self._pending = 0
+        """Take the steps of a launch."""
+        self.launch(self._first, self.rows.step + 1 - self._first)
 
     def _record_bed(self) -> None:
         """Keep the bed's motion, or its pressures, if this step records the bodies."""

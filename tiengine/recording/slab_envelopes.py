@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.engine.state import DISPLACEMENT
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.stepper import Plan, Stepper
 from tiengine.model.implicit_seats import seat_shapes
 from tiengine.model.ingredients import Ingredients
-from tiengine.parameters.arrays import Reals
+from tiengine.parameters.arrays import Flags, Reals
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.slab_moments import moment_operator
@@ -124,13 +124,13 @@ class SlabEnvelopes:
         """Name of its stage of the step."""
         return "envelopes"
 
-    def due(self) -> bool:
-        """Whether the present step records the bodies."""
-        return self.stepper.rows.body >= 0
+    def due(self, plan: Plan) -> Flags:
+        """Steps that record the bodies."""
+        return plan.body >= 0
 
     def watch(self) -> None:
         """Take in the slabs' shape if the step records the bodies."""
-        if not self.due():
+        if self.stepper.rows.body < 0:
             return
         state = self.stepper.state
         first, motion = state.first_slab, state.slab_motion(DISPLACEMENT)

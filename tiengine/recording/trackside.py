@@ -13,8 +13,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tiengine.engine.stepper import Stepper
-from tiengine.parameters.arrays import Reals
+from tiengine.engine.stepper import Plan, Stepper
+from tiengine.parameters.arrays import Flags, Reals
 from tiengine.recording.deflection import Deflection
 from tiengine.recording.gauge_samples import gauge_samples
 from tiengine.recording.seat_envelopes import SeatEnvelopes
@@ -38,8 +38,8 @@ class Watcher(Protocol):
     def watch(self) -> None:
         """Read the state at the end of a step."""
 
-    def due(self) -> bool:
-        """Whether :meth:`watch` will read the state after the present step."""
+    def due(self, plan: Plan) -> Flags:
+        """Steps of a plan after which :meth:`watch` reads the state, shape (steps,)."""
 
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
         """Hand over what is complete, train by train.

@@ -152,7 +152,7 @@ def history(speed: int, numerics: Numerics) -> History:
     missing = LOAD * float(model.constants[at.RESIDUAL_VERTICAL])
     model.vehicle_load[:] = 0.0
     steps, last = (int(np.ceil(distance / (V * dt))) for distance in (RAMP + SETTLE + d, d))
-    state, chunk = state_at_rest(model), Chunk.empty(model.ingredients, steps, 1, 1)
+    state, chunk = state_at_rest(model), Chunk.empty(model.ingredients, steps, 1)
     stepper = make_stepper(model, state, chunk)
     X = V * dt * np.arange(1.0, steps + 1)
     stepper.load(X, np.full(steps, V), np.zeros(steps), _switched_on(chunk.irregularity, X))

@@ -355,6 +355,6 @@ def implicit_and_contact(
         add_wheels(constants, inverse, shape_out, rail_before_out, rails)
         add_vehicle_response(vehicle_response, wheelset_before_out, motion)
         update_vehicle(constants, motion)
-        if tick[at.LAST_PASS] == 1 and tick[at.WHEEL_RECORD] >= 0:
+        if tick[at.LAST_PASS] == 1:
             for w in range(dims[at.WHEELSETS]):
-                ct.record_wheels(0, w, tick[at.WHEEL_RECORD], contact_out, force_out, rail_force_out, wheel_record_out)
+                ct.record_wheels(0, w, tick[at.STEP], contact_out, force_out, rail_force_out, wheel_record_out)
