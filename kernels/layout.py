@@ -82,9 +82,7 @@ MOTION_ROWS = 7
 # the contact feels them, radius deviations of either wheel and their slopes along the wheel's path.
 (RAIL_LEFT, RAIL_RIGHT, RAIL_LEFT_SLOPE, RAIL_RIGHT_SLOPE) = range(N_IRREGULARITY, N_IRREGULARITY + 4)
 (GROWN, GROWN_SLOPE, TURNED, N_SHAPED) = range(N_IRREGULARITY + 4, N_IRREGULARITY + 8)
-(WHEEL_LEFT, WHEEL_RIGHT, WHEEL_LEFT_SLOPE, WHEEL_RIGHT_SLOPE, N_FELT) = range(
-    N_IRREGULARITY + 4, N_IRREGULARITY + 9
-)
+(WHEEL_LEFT, WHEEL_RIGHT, WHEEL_LEFT_SLOPE, WHEEL_RIGHT_SLOPE, N_FELT) = range(N_IRREGULARITY + 4, N_IRREGULARITY + 9)
 
 # Numbers of a wheelset: r0, b0, spin inertia, tables of its wheels out of round (-1 for none).
 (NOMINAL_RADIUS, HALF_SPACING, SPIN_INERTIA, ROUND_LEFT, ROUND_RIGHT, N_WHEEL_NUMBERS) = range(6)

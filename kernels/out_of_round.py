@@ -1,4 +1,4 @@
-"""Rails and wheels that are not perfect, as a wheel meets them: shapes of single rails, wheels out of round (MODEL §14).
+"""Rails and wheels that are not perfect: shapes of single rails, wheels out of round (MODEL §14).
 
 A wheel's radius deviation is a periodic table over its rotation angle, cubic between its points. The angle is that of
 rolling without slip on the nominal radius, which the host gives, less the wheelset's pitch: pitch is the perturbation

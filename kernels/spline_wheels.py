@@ -162,7 +162,8 @@ def contact_of_train(
     """Solve the contact of all wheelsets of a train, one after another, and leave the rails' loads in ``under``.
 
     ``lane`` is the train's left rail; ``record`` is the row of the wheels' record to fill, -1 for none; with
-    ``shaped`` = 1 rails have shapes or wheels are out of round (``out_of_round``); other arguments as in ``contact``, ``vehicle_columns`` and this module.
+    ``shaped`` = 1 rails have shapes or wheels are out of round (``out_of_round``); other
+    arguments as in ``contact``, ``vehicle_columns`` and this module.
     """
     start = b * cars * at.CAR_ROWS * blocks * 8
     for w in range(dims[layout.WHEELSETS]):

@@ -8,13 +8,13 @@ from pydantic import ValidationError
 from scipy.signal import welch
 from scipy.stats import chi2
 
-from tiengine.irregularity.patch_filter import PATCH_HALF_LENGTH
 from tiengine.irregularity.irregularity import (
     HALF_BASE,
     IrregularityParams,
     at_wheels,
     make_irregularity,
 )
+from tiengine.irregularity.patch_filter import PATCH_HALF_LENGTH
 from tiengine.irregularity.spectrum import (
     CHANNELS,
     band_variances,

@@ -95,8 +95,10 @@ def _waves_of_shapes(scenario: Scenario, tables: WheelTables | None) -> list[tup
         (f"track.rail_shapes[{i}]: shortest wave of the {shape.kind}", wave)
         for i, (shape, wave) in enumerate(zip(shapes, RailShapes(shapes).waves, strict=True))
     ]
-    for table, (wave, order) in enumerate(() if tables is None else tables.waves):
-        found.append((f"train.wheel_shapes: shortest wave of {tables.name(table)}, of order {order},", wave))
+    if tables is not None:
+        names = [f"{tables.name(table)}, of order {order}," for table, (_, order) in enumerate(tables.waves)]
+        waves = [wave for wave, _ in tables.waves]
+        found += [(f"train.wheel_shapes: shortest wave of {name}", w) for name, w in zip(names, waves, strict=True)]
     return found
 
 

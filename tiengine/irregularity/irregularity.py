@@ -253,7 +253,6 @@ class Irregularity:
             value *= T[:, None]
         return out.reshape(*chainage.shape, -1)
 
-
     def grown(self, x: Reals) -> tuple[Reals, Reals]:
         """Share of its full amplitude to which the irregularity has grown, and the share's slope [1/m].
 

@@ -7,7 +7,7 @@ import numpy as np
 from tiengine.irregularity.spectrum import contact_filter
 from tiengine.parameters.arrays import Reals
 
-__all__ = ["PATCH_HALF_LENGTH", "felt_share", "felt_shape", "felt_wave"]
+__all__ = ["PATCH_HALF_LENGTH", "felt_shape", "felt_share", "felt_wave"]
 
 PATCH_HALF_LENGTH = 6e-3
 """Half length of the contact patch along the rail [m] in the filter of short waves (6 to 7 mm at 70 kN)."""
@@ -37,5 +37,5 @@ def felt_shape(z: Reals, step: float) -> Reals:
     Returns:
         Heights as a wheel feels them, shape (n,).
     """
-    Omega = 2.0 * np.pi * np.fft.rfftfreq(len(z), step)
+    Omega: Reals = 2.0 * np.pi * np.fft.rfftfreq(len(z), step).astype(np.float64)
     return np.asarray(np.fft.irfft(np.fft.rfft(z) * felt_share(Omega), len(z)), np.float64)

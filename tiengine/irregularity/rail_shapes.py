@@ -26,6 +26,7 @@ __all__ = ["RailShape", "RailShapes", "check_rail_shapes"]
 SIDES = {"left": (0,), "right": (1,), "both": (0, 1)}
 STEP = 1e-3  # m between the points of a filtered shape: a sixth of the patch
 MARGIN = 0.5  # m beyond a weld or joint, where the filter's tail has fallen to 1e-6 of the depth
+END = 0.1  # m over which what is left of the tail fades
 MOST_POINTS = 4_000_000  # of a filtered series
 NEEDED = {
     "corrugation": ("reach", "wavelength", "depth"),
@@ -41,8 +42,8 @@ Chainage = Annotated[float, Q("m", "chainage", ge=0, le=1e7)]
 class RailShape(Params):
     """A shape of the running surface of one rail or both, down positive; it adds to the irregularity.
 
-    `corrugation` is a sine over `reach` that grows and fades over `taper`; `weld` one wave 1 - cos; `joint` two straight
-    ramps that meet at an angle. A negative depth stands up: a raised weld, a peaked joint. `file` is a series with the
+    `corrugation` is a sine over `reach` that grows and fades over `taper`; `weld` one wave 1 - cos; `joint` two
+    straight ramps that meet at an angle. A negative depth stands up: a raised weld, a peaked joint. `file` is a series with the
     columns `x` and `vertical`, as a measured track has them (docs/files.md). Waves that are short against the contact
     patch are weakened as those of rail roughness are.
     """
@@ -91,7 +92,9 @@ class _Corrugation:
     """A sine of one length; the taper is at most half of its reach."""
 
     def __init__(self, shape: RailShape) -> None:
-        assert shape.reach is not None and shape.wavelength is not None and shape.depth is not None
+        assert shape.reach is not None
+        assert shape.wavelength is not None
+        assert shape.depth is not None
         self.start, self.end = shape.reach
         self.shortest, self._phase = shape.wavelength, shape.phase
         self._amplitude = 0.5 * shape.depth * felt_wave(shape.wavelength)
@@ -112,8 +115,9 @@ class _Sampled:
     """A spline through filtered heights that are zero at both ends."""
 
     def __init__(self, x: Reals, z: Reals) -> None:
-        felt = felt_shape(z, float(x[1] - x[0]))
         self.start, self.end = float(x[0]), float(x[-1])
+        ends = smooth_step((x - self.start) / END)[0] * smooth_step((self.end - x) / END)[0]
+        felt = felt_shape(z, float(x[1] - x[0])) * ends
         self.shortest = shortest_content(np.column_stack([x, felt]), np.ones(1))
         self._value = CubicSpline(x, felt, bc_type="natural")
         self._slope = self._value.derivative()
@@ -127,13 +131,15 @@ class _Sampled:
 
 def _place(shape: RailShape) -> _Sampled:
     """A weld or a joint."""
-    assert shape.at is not None and shape.length is not None and shape.depth is not None
+    assert shape.at is not None
+    assert shape.length is not None
+    assert shape.depth is not None
     half = 0.5 * shape.length
     count = int(np.ceil((half + MARGIN) / STEP))
     s = STEP * np.arange(-count, count + 1)
     t = np.minimum(np.abs(s) / half, 1.0)
     form = 0.5 * (1.0 + np.cos(np.pi * t)) if shape.kind == "weld" else 1.0 - t
-    return _Sampled(shape.at + s, shape.depth * form)
+    return _Sampled(np.asarray(shape.at + s, np.float64), shape.depth * form)
 
 
 def _series(shape: RailShape, where: str) -> _Sampled:

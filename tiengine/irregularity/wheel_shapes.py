@@ -37,11 +37,11 @@ Phase = Annotated[float, Q("rad", "phase at the start", ge=-1e4, le=1e4)]
 class WheelShape(Params):
     """A deviation from the round of single wheels; shapes of the same wheel add.
 
-    `harmonics` is a sum of A cos(n angle + phase). `flat` is a flat of the given length: a `new` one has sharp edges, and
-    the wheel's centre falls as it turns about one edge and rises about the other, by length^2/(8 r0) in the middle; a
-    `worn` one has the same depth as one wave 1 - cos. `file` is a measured polygon (docs/files.md). Waves that are short
-    against the contact patch are weakened as those of rail roughness are. With the irregularity's `taper` the shapes
-    grow in from a round wheel at the start.
+    `harmonics` is a sum of A cos(n angle + phase). `flat` is a flat of the given length: a `new` one has sharp edges,
+    and the wheel's centre falls as it turns about one edge and rises about the other, by length^2/(8 r0) in the middle;
+    a `worn` one has the same depth as one wave 1 - cos. `file` is a measured polygon (docs/files.md). Waves that are
+    short against the contact patch are weakened as those of rail roughness are. With the irregularity's `taper` the
+    shapes grow in from a round wheel at the start.
     """
 
     kind: Annotated[Literal["harmonics", "flat", "file"], Field(description="shape")]
@@ -58,8 +58,8 @@ class WheelShape(Params):
     length: Annotated[float | None, Q("m", "length of a flat along the tread", gt=0, le=0.2)] = None
     form: Annotated[Literal["new", "worn"], Field(description="edges of a flat: sharp or rolled over")] = "new"
     angle: Annotated[
-        float, Q("rad", "angle by which the wheel turns until the middle of a flat, or angle 0 of a file, touches", ge=-1e4, le=1e4)
-    ] = 0.0  # fmt: skip
+        float, Q("rad", "turn of the wheel until the middle of a flat, or angle 0 of a file, touches", ge=-1e4, le=1e4)
+    ] = 0.0
     file: Annotated[str | None, Field(description="measured polygon, relative to the scenario", max_length=4096)] = None
     scale: Annotated[float, Q("-", "factor on the deviations of a file", ge=-1e3, le=1e3)] = 1.0
 
@@ -152,7 +152,7 @@ def wheel_tables(shapes: Sequence[WheelShape], radius: Sequence[float]) -> Wheel
         InputError: A file breaks a rule, or a flat is too long.
     """
     number = np.full((len(radius), 2), -1, dtype=np.int32)
-    angle = 2.0 * np.pi / ROUND_POINTS * np.arange(ROUND_POINTS)
+    angle: Reals = (2.0 * np.pi / ROUND_POINTS * np.arange(ROUND_POINTS)).astype(np.float64)
     felt: dict[tuple[float, tuple[int, ...]], Reals] = {}
     for w, r0 in enumerate(radius):
         for side in range(2):

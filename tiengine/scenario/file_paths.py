@@ -1,4 +1,4 @@
-"""Paths of files that are read at every run: a scenario names them relative to its own folder, a run needs them absolute."""
+"""Paths of files that are read at every run: relative to the scenario's folder as named, absolute for a run."""
 
 from __future__ import annotations
 

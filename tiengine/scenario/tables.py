@@ -64,9 +64,7 @@ class Train(Params):
         bool,
         Field(description="springs in series with dampers (k_series) are modelled; a vehicle may also set this itself"),
     ] = False
-    wheel_shapes: Annotated[
-        tuple[WheelShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)
-    ] = ()
+    wheel_shapes: Annotated[tuple[WheelShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
     effort: Annotated[
         Effort,
         Field(
