@@ -43,9 +43,9 @@ class RailShape(Params):
     """A shape of the running surface of one rail or both, down positive; it adds to the irregularity.
 
     `corrugation` is a sine over `reach` that grows and fades over `taper`; `weld` one wave 1 - cos; `joint` two
-    straight ramps that meet at an angle. A negative depth stands up: a raised weld, a peaked joint. `file` is a series with the
-    columns `x` and `vertical`, as a measured track has them (docs/files.md). Waves that are short against the contact
-    patch are weakened as those of rail roughness are.
+    straight ramps that meet at an angle. A negative depth stands up: a raised weld, a peaked joint. `file` is a series
+    with the columns `x` and `vertical`, as a measured track has them (docs/files.md). Waves that are short against the
+    contact patch are weakened as those of rail roughness are.
     """
 
     kind: Annotated[Literal["corrugation", "weld", "joint", "file"], Field(description="shape")]
