@@ -21,6 +21,8 @@ from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import N_CONTACT
 from tiengine.model.constant_data import Model
 from tiengine.parameters.errors import InputError
+from tiengine.vehicle.connector import table_force
+from tiengine.vehicle.given_loads import GivenLoads, no_loads
 
 __all__ = ["ContactForces", "equilibrium", "evaluate_contact", "release"]
 
@@ -92,7 +94,7 @@ def evaluate_contact(
 
 
 def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 0.0) -> None:
-    """Put all trains of a state into steady rolling on a smooth track.
+    """Put all trains of a state into steady rolling on a smooth track, in a curve if they stand in one.
 
     Args:
         model: Constant data.
@@ -105,7 +107,8 @@ def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 
         InputError: Newton's method found no equilibrium.
     """
     track = steady_track(model, state, _enter(model, state, X), V)
-    problem = _Problem(model, track, V, V_rate)
+    given = _given(model, X, V, V_rate)
+    problem = _Problem(model, track, V, V_rate, given)
     y = problem.solve()
     x, rates, rail_force = problem.split(y[None])
     vertical, lateral, slabs = track.motion(rail_force[0])
@@ -141,14 +144,22 @@ def _enter(model: Model, state: State, X: float) -> float:
     return float(clock[at.FIRST_SEAT_S])
 
 
+def _given(model: Model, X: float, V: float, V_rate: float) -> GivenLoads:
+    """Given loads of the train where it stands; those of the first train if they differ."""
+    g = model.ingredients
+    now = (np.zeros(1), np.array([X + g.centre_s]), np.array([V]), np.array([V_rate]))
+    return g.given_loads(*now) or no_loads(g.train, 1)
+
+
 class _Problem:
     """Residual of steady rolling: train (n), then contact forces on the rails (6 W)."""
 
-    def __init__(self, model: Model, track: Track, V: float, V_rate: float) -> None:
+    def __init__(self, model: Model, track: Track, V: float, V_rate: float, given: GivenLoads) -> None:
         self.model, self.track, self.V = model, track, V
         self.train = model.ingredients.train
         self.pitch = self.train.wheelset_dof[:, 3]
-        self.load = self.train.gravity + V_rate * self.train.acceleration_force
+        self.load = self.train.gravity + V_rate * self.train.acceleration_force + given.force[0, 0]
+        self.elongation, self.frame_rate = given.elongation[0, 0], given.frame_rate[0, 0]
 
     def split(self, y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Coordinates (B, n), pitch rates (B, W), forces on the rails (B, W, 2, 3)."""
@@ -171,7 +182,9 @@ class _Problem:
         rail = self.track.under_wheels(force)
         dof = self.train.wheelset_dof
         smooth = np.zeros((1, len(dof), at.N_IRREGULARITY))
-        return evaluate_contact(self.model, self.V, smooth, x[:, dof], v[:, dof], rail)
+        v_wheelsets = v[:, dof]
+        v_wheelsets[..., 4] += self.frame_rate[:, 0]
+        return evaluate_contact(self.model, self.V, smooth, x[:, dof], v_wheelsets, rail)
 
     def residual(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forces out of balance, shape (B, n + 6 W)."""
@@ -180,7 +193,29 @@ class _Problem:
         out = np.broadcast_to(self.load, x.shape) - x @ self.train.K.T
         out = out - self.spread(rates) @ (self.train.C + self.V * self.train.C_speed).T
         out[:, self.train.wheelset_dof] += found.wheelset
+        if self.model.ingredients.given:
+            out += self._beyond_linear(x, rates)
         return np.hstack([out, (found.rail - force).reshape(len(y), -1)])
+
+    def _beyond_linear(self, x: NDArray[np.float64], rates: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces of nonlinear elements beyond their linear part, gyroscopic pair of pitch rates in moving frames."""
+        out = self._suspension(x)
+        spin = self.train.wheelset_spin_inertia * rates
+        out[:, self.train.wheelset_dof[:, 2]] += spin * self.frame_rate[:, 0]
+        out[:, self.train.wheelset_dof[:, 4]] -= spin * self.frame_rate[:, 1]
+        return out
+
+    def _suspension(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces of the nonlinear elements beyond their linear part, the bodies being at rest in their frames."""
+        train, out = self.train, np.zeros_like(x)
+        for e, kind in enumerate(train.element_kind):
+            index, row = train.element_index[e], train.element_row[e]
+            q = np.full(len(x), self.elongation[e]) + (x[:, index] @ row if kind else 0.0)
+            if not q.any():
+                continue
+            deviation = table_force(train.element_table[e], q) - train.element_linear[e] * q
+            np.add.at(out.T, index, -row[:, None] * deviation)
+        return out
 
     def solve(self) -> NDArray[np.float64]:
         """Newton's method, from high friction down to the scenario's where it fails at once; shape (n + 6 W,).

@@ -121,7 +121,7 @@ def _cars(model: SplineModel, V: float) -> CarTables:
     """Tables of the vehicles."""
     train, newmark = model.ingredients.train, model.ingredients.newmark
     return CarTables.of(
-        train.M, train.C + V * train.C_speed, train.K, model.vehicle_load, coupled_coordinates(train),
+        train.M, train.C + V * train.C_speed, train.K, coupled_coordinates(train),
         train.wheelset_dof, train.element_index, newmark.beta_dt2, newmark.gamma_dt,
     )  # fmt: skip
 

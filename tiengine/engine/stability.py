@@ -92,8 +92,8 @@ def with_stiffest_seats(ingredients: Ingredients, factor: float) -> Ingredients:
 
 
 def of_trains(model: Model, trains: int) -> Model:
-    """The same model for another number of trains: only sizes differ, all else is shared."""
-    ingredients = replace(model.ingredients, trains=trains)
+    """The same model for another number of trains, on straight level track: only sizes differ, all else is shared."""
+    ingredients = replace(model.ingredients, trains=trains, given=())
     return replace(model, ingredients=ingredients, dims=shared_arrays(ingredients)["dims"])
 
 

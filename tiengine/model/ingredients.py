@@ -13,6 +13,7 @@ from tiengine.contact.table import ContactTable
 from tiengine.irregularity.wheel_shapes import WheelTables
 from tiengine.kernels import layout as at
 from tiengine.model.newmark import Newmark
+from tiengine.parameters.arrays import Reals
 from tiengine.track.fastening import Fastening, seat_count
 from tiengine.track.knots import Grading, graded_knots
 from tiengine.track.mortar import Mortar
@@ -22,6 +23,7 @@ from tiengine.track.sines import Sines
 from tiengine.track.slab import Slab
 from tiengine.track.slab_matrices import SlabMatrices
 from tiengine.track.splines import Splines
+from tiengine.vehicle.given_loads import GivenLoads, LoadSource, sum_of_loads
 from tiengine.vehicle.train import TrainModel, centre_in_window
 
 __all__ = ["Ingredients", "SlabDesigns"]
@@ -69,6 +71,7 @@ class Ingredients:
         shaped: Whether rails have shapes or wheels are out of round.
         out_of_round: Tables of wheels out of round; None where all are round.
         trains: Trains advanced together.
+        given: What makes given loads of the train, beyond gravity.
     """
 
     rail: Rail
@@ -93,6 +96,16 @@ class Ingredients:
     shaped: bool = False
     out_of_round: WheelTables | None = None
     trains: int = 1
+    given: tuple[LoadSource, ...] = ()
+
+    @property
+    def load_sets(self) -> int:
+        """Sets of given loads: 0 if there are none, 1 if all trains have the same, else one for each train."""
+        return max((source.sets for source in self.given), default=0)
+
+    def given_loads(self, time: Reals, x: Reals, V: Reals, V_rate: Reals) -> GivenLoads | None:
+        """Sum of the given loads, None if there are none; arguments as in :class:`LoadSource`."""
+        return sum_of_loads(self.given, self.train, time, x, V, V_rate) if self.given else None
 
     @property
     def channels(self) -> int:
