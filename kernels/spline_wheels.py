@@ -162,8 +162,8 @@ def contact_of_train(
     """Solve the contact of all wheelsets of a train, one after another, and leave the rails' loads in ``under``.
 
     A wheelset yaws against the rails with its own rate and that of the track frame. ``lane`` is the train's left rail;
-    ``record`` is the row of the wheels' record to fill, -1 for none; with ``shaped`` = 1 rails have shapes or wheels are
-    out of round (``out_of_round``); other arguments as in ``contact``, ``vehicle_columns`` and this module.
+    ``record`` is the row of the wheels' record to fill, -1 for none; with ``shaped`` = 1 rails have shapes or wheels
+    are out of round (``out_of_round``); other arguments as in ``contact``, ``vehicle_columns`` and this module.
     """
     start = b * size[at.CARS] * at.CAR_ROWS * blocks * 8
     yaw_rate = (load_row(b, step, size, blocks) + size[at.CARS] * blocks) * 8 + size[at.ELEMENTS]

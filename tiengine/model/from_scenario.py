@@ -32,7 +32,13 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
     """
     parts, numerics = scenario.parts, scenario.numerics
     asked, shapes = scenario.train, scenario.train.wheel_shapes
-    train = assemble(parts.vehicles, parts.centres, series_springs=asked.series_springs or None, effort=asked.effort)
+    train = assemble(
+        parts.vehicles,
+        parts.centres,
+        series_springs=asked.series_springs or None,
+        effort=asked.effort,
+        couplings=parts.couplings,
+    )
     return Ingredients(
         rail=parts.rail,
         fastening=parts.fastening,

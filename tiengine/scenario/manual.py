@@ -28,6 +28,7 @@ from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail
 from tiengine.track.slab import Slab
 from tiengine.vehicle.coach import Coach
+from tiengine.vehicle.coupling import Coupling
 from tiengine.vehicle.vehicle import Vehicle
 
 __all__ = ["Table", "channel_tables", "page", "tables", "with_channels"]
@@ -95,6 +96,7 @@ def tables() -> tuple[list[Table], list[Table]]:
         ("slab, `[mortar]`", Mortar),
         ("fastening", Fastening),
         ("profile", ProfilePoints),
+        ("coupling", Coupling),
         ("vehicle, as a coach on bogies", Coach),
         ("vehicle, as bodies and connectors", Vehicle),
     ):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tiengine.contact.point_list import Kind
 from tiengine.contact.profile import Profile
 from tiengine.parameters.errors import InputError, nearest
-from tiengine.parameters.input_files import load_toml
+from tiengine.parameters.input_files import load_toml, to_tuples
 from tiengine.parameters.presets import KINDS, find_preset
 from tiengine.parameters.quantity import build
 from tiengine.scenario.part import Presets
@@ -27,6 +27,7 @@ from tiengine.track.fastening import Fastening
 from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail
 from tiengine.track.slab import Slab
+from tiengine.vehicle.coupling import Coupling
 from tiengine.vehicle.vehicle import Vehicle, vehicle_from_table
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ class Parts:
         slab: Slab.
         mortar: Mortar bed of the slab.
         fastening: Fastening.
+        couplings: Couplings, each with the number of the vehicle ahead, from 0.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -58,6 +60,7 @@ class Parts:
     slab: Slab
     mortar: Mortar
     fastening: Fastening
+    couplings: tuple[tuple[int, Coupling], ...] = ()
 
     @property
     def wheelset_positions(self) -> NDArray[np.float64]:
@@ -152,6 +155,7 @@ def build_parts(train: Train, track: Track, presets: Presets) -> Parts:
         slab=build(Slab, slab_table, "track.slab"),
         mortar=mortar,
         fastening=build(Fastening, tables["track.fastening"], "track.fastening"),
+        couplings=_couplings(train, vehicles, tables),
     )
 
 
@@ -159,6 +163,8 @@ def _references(train: Train, track: Track) -> Iterator[tuple[str, str, str | di
     """Key, kind and value of every part that a scenario refers to."""
     for i, vehicle in enumerate(train.vehicles):
         yield f"train.vehicles[{i}]", "vehicles", vehicle
+    for i, coupled in enumerate(train.couplings):
+        yield f"train.couplings[{i}].part", "couplings", coupled.part
     yield "train.wheel_profile", "profiles", train.wheel_profile
     yield "track.rail", "rails", track.rail
     yield "track.rail_profile", "profiles", track.rail_profile
@@ -197,6 +203,24 @@ def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
         merged[key] = _merged(merged[key], value) if both else value
     return merged
+
+
+def _couplings(
+    train: Train, vehicles: list[Vehicle], tables: Mapping[str, dict[str, Any]]
+) -> tuple[tuple[int, Coupling], ...]:
+    """Couplings behind the vehicles that have them."""
+    found = []
+    for i, entry in enumerate(train.couplings):
+        where = f"train.couplings[{i}]"
+        behind = tuple(range(1, len(vehicles))) if entry.behind == "all" else entry.behind
+        if not behind or max(behind) >= len(vehicles):
+            rule = f"must be numbers from 1 to {len(vehicles) - 1}" if len(vehicles) > 1 else "needs two vehicles"
+            raise InputError(f"{where}.behind = {entry.behind if entry.behind == 'all' else list(behind)!r}: {rule}")
+        coupling = build(Coupling, to_tuples(tables[f"{where}.part"], f"{where}.part"), f"{where}.part")
+        for k in behind:
+            coupling.check_bodies(vehicles[k - 1], vehicles[k], f"{where}.part")
+            found.append((k - 1, coupling))
+    return tuple(found)
 
 
 def _centres(vehicles: list[Vehicle], train: Train) -> NDArray[np.float64]:

@@ -28,6 +28,16 @@ MOST_DEFECTS = 10_000  # of each kind
 MOST_SHAPES = 1000  # of rails, of wheels
 
 
+class Coupled(Params):
+    """Coupling of neighbouring vehicles, a part; several entries for the same vehicles add."""
+
+    part: Annotated[Part, Field(description="part: springs, dampers and stops between two vehicles")]
+    behind: Annotated[
+        tuple[Annotated[int, Q("-", "number", ge=1, le=64)], ...] | Literal["all"],
+        Field(description="vehicles behind which it lies, counted from the front from 1"),
+    ] = "all"
+
+
 class Train(Params):
     """Vehicles, speed and distance of the train; parts are explained below."""
 
@@ -64,6 +74,7 @@ class Train(Params):
         bool,
         Field(description="springs in series with dampers (k_series) are modelled; a vehicle may also set this itself"),
     ] = False
+    couplings: Annotated[tuple[Coupled, ...], Field(description="tables, see below", max_length=100)] = ()
     wheel_shapes: Annotated[tuple[WheelShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
     effort: Annotated[
         Effort,

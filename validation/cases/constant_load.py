@@ -119,7 +119,7 @@ def _wheelset(given: Ingredients) -> TrainModel:
         wheelset_spin_inertia=np.zeros(1), body_names=("wheelset",),
         element_index=np.zeros((0, 12), dtype=np.int32), element_row=np.zeros((0, 12)),
         element_kind=np.zeros(0, dtype=np.int32), element_linear=np.zeros(0), element_table=np.zeros((0, 2, 2)),
-        element_names=(),
+        element_names=(), element_between_cars=np.zeros(0, dtype=np.bool_),
     )  # fmt: skip
 
 
