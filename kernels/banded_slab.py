@@ -182,6 +182,14 @@ def clear_loads(slab: Array, base: int, dofs: int):
 
 
 @ti.func
+def record_motion(slab: Array, base: int, dofs: int, out: int, record_out: Array):
+    """Copy a group's displacements and rates to ``record_out``, whose rows alternate, from row ``out`` on."""
+    for i in range(dofs):
+        s = (base + i) * at.SLAB_ROWS
+        record_out[out + 2 * i], record_out[out + 2 * i + 1] = slab[s + at.U], slab[s + at.V]
+
+
+@ti.func
 def bed_forces(
     b: int, slot: int, base: int, row_u: int, row_v: int, dofs: int, design: int, index: Array, shape: Array,
     weight: Array, factor: Array, rest: Array, lateral_K: Array, lateral_C: Array, numbers: Array, slab: Array,

@@ -100,6 +100,7 @@ def step_kernel(lanes: int, K: int, blocks: int, shaped: int) -> Any:
         slab: eights,
         slab_seat: eights,
         slab_design: eights,
+        slab_record: eights,
         slab_coefficient: Reals1,
         slab_seat_index: Ints3,
         slab_seat_shape: Reals4,
@@ -266,6 +267,13 @@ def step_kernel(lanes: int, K: int, blocks: int, shaped: int) -> Any:
                         if p == 0:
                             sweep_slabs(b, dofs, 0, size, constants, slab_design, slab, slab_coefficient, K)
                         sweep_slabs(b, dofs, 1, size, constants, slab_design, slab, slab_coefficient, K)
+                    if last_pass == 1 and record[step] >= 0:
+                        for b in range(b0, b_end):
+                            for g in range(groups):
+                                row = (b * body_record.shape[1] + record[step]) * groups + g
+                                slabs.record_motion(
+                                    slab, (b * groups + g) * (dofs + 2 * K) + K, dofs, row * 2 * dofs, slab_record
+                                )
                     if ahead == 1:
                         for g in range(b0 * groups, (b0 + trains_a_chunk) * groups):
                             slabs.predict(slab, g * (dofs + 2 * K) + K, dofs, constants)

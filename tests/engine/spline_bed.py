@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
+from tiengine.engine.aligned import aligned_zeros
 from tiengine.engine.banded import BandedBlock
 from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.spline_arrays import SplineArrays
@@ -262,6 +263,7 @@ def make_bed(
         irregularity[b] = 1e-4 * np.random.default_rng((7, b)).standard_normal((steps, W, at.N_IRREGULARITY))
     record = np.zeros((B, steps, W, 2, at.N_WHEEL))
     body_record = np.zeros((B, steps, 3, train.n_dof))
+    slab_record = aligned_zeros((B * steps * state.groups * state.slab_dofs * 2, 8))
     slab_bed = SlabBed(
         model.bed_index, model.bed_shape, model.bed_weight, *(np.concatenate([f, f[:1]]) for f in (
             model.bed_factor, model.bed_rest, model.bed_lateral_K, model.bed_lateral_C)), model.bed_numbers,
@@ -270,7 +272,7 @@ def make_bed(
     step = SplineStep(
         state, model.dims, c, passes, rails, spans, seats, slabs,
         Suspension(train.element_row, train.element_kind, train.element_linear, train.element_table), contact, clock,
-        irregularity, record, body_record, slab_bed,
+        irregularity, record, body_record, slab_record, slab_bed,
         LoadRows(given, model.vehicle_load, cars.load_place, 8 * cars.blocks * len(cars.car), 8, steps),
     )  # fmt: skip
     return Bed(

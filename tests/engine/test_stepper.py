@@ -111,12 +111,15 @@ class OtherStepper(Stepper):
         state.seats[:, 0] = 1e3 * (1 + self.rows.step)
         if self.rows.body >= 0:
             self.chunk.body[:, self.rows.body] = np.arange(3)[:, None]
+            self.chunk.slab[:, self.rows.body, 0] = state.slab_motion(0)
+            self.chunk.rear_slab[self.rows.body] = state.first_slab
         self.chunk.wheel[:, self.rows.step] = self.rows.step
 
     def factor(self, V: float) -> None:
         self.factored_speed = V
 
     def finish(self, body_rows: int) -> None:
+        self.chunk.filled = body_rows
         self.chunk.mortar[:, :body_rows, :, 0] = 1.0
 
     def compile(self) -> float:

@@ -110,6 +110,7 @@ class SplineStep:
         irregularity: Floats,
         wheel_record: Floats,
         body_record: Floats,
+        slab_record: Floats,
         bed: Bed,
         loads: LoadRows,
     ):
@@ -130,6 +131,8 @@ class SplineStep:
             irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
             wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
+            slab_record: Displacement, then velocity of every slab coordinate where the bodies are recorded, vectors,
+                shape (B rows groups N 2, 8).
             bed: Bed, read if MORTAR_MODE is not 0.
             loads: Loads of the cars.
         """
@@ -148,8 +151,8 @@ class SplineStep:
             self.job, self.record, size, dims, constants, clock,
             state.rail, rails.coefficient,
             state.seat, seats.point, spans.span, seats.place, seats.shape,
-            state.slab, state.slab_seat, state.slab_design, slabs.coefficient, slabs.seat_index,
-            slabs.seat_shape, slabs.seat_x,
+            state.slab, state.slab_seat, state.slab_design, slab_record, slabs.coefficient,
+            slabs.seat_index, slabs.seat_shape, slabs.seat_x,
             state.car, cars.columns, car_load, cars.columns_start, cars.vehicle_place, cars.wheelset_place,
             cars.element_place,
             suspension.row, suspension.kind, suspension.linear, suspension.table,
@@ -159,8 +162,8 @@ class SplineStep:
             body_record, bed.index, bed.shape, bed.weight, bed.factor, bed.rest, bed.lateral_K, bed.lateral_C,
             bed.numbers, np.zeros((3, slabs.dofs)), bed.pressure,
         )  # fmt: skip
-        vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, state.car,
-                   cars.columns, car_load)  # fmt: skip
+        vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, slab_record,
+                   state.car, cars.columns, car_load)  # fmt: skip
         self.launch = VectorLaunch(
             step_kernel,
             (state.lanes, slabs.half_width, cars.blocks, int(irregularity.shape[-1] > layout.N_IRREGULARITY)),
