@@ -14,7 +14,7 @@ from tiengine.irregularity.irregularity import IrregularityParams
 from tiengine.irregularity.rail_shapes import RailShapes
 from tiengine.irregularity.track_checks import check_step, check_wave, shortest_wavelength
 from tiengine.irregularity.wheel_shapes import WheelTables, wheel_tables
-from tiengine.model.from_scenario import ingredients
+from tiengine.model.from_scenario import given_sources, ingredients
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
 from tiengine.model.spline_model import DivergingPassesError
@@ -64,7 +64,9 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
             if wanted == "auto" and dt != AUTO_STEPS[-1]:
                 continue
             raise
-        parts = replace(_ingredients(_Key.of(scenario)), newmark=Newmark(dt), out_of_round=round_tables)
+        kept = _ingredients(_Key.of(scenario))
+        given = given_sources(scenario, kept.train)  # files are read anew
+        parts = replace(kept, newmark=Newmark(dt), out_of_round=round_tables, given=given)
         lanes = lanes_for(trains)
         try:
             model = build_model(parts, fastest)

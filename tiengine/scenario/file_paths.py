@@ -11,7 +11,7 @@ from tiengine.scenario.ensemble import Ensemble
 
 __all__ = ["absolute_files", "absolute_vary"]
 
-FILES = (("irregularity",), ("track", "rail_shapes"), ("train", "wheel_shapes"))
+FILES = (("irregularity",), ("track", "rail_shapes"), ("train", "wheel_shapes"), ("train", "forces"))
 """Tables, or lists of tables, whose key ``file`` names such a file."""
 
 

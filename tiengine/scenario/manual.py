@@ -30,6 +30,7 @@ from tiengine.track.slab import Slab
 from tiengine.vehicle.coach import Coach
 from tiengine.vehicle.coupling import Coupling
 from tiengine.vehicle.vehicle import Vehicle
+from tiengine.vehicle.wind import Aerodynamics
 
 __all__ = ["Table", "channel_tables", "page", "tables", "with_channels"]
 
@@ -97,6 +98,7 @@ def tables() -> tuple[list[Table], list[Table]]:
         ("fastening", Fastening),
         ("profile", ProfilePoints),
         ("coupling", Coupling),
+        ("aerodynamics of a car", Aerodynamics),
         ("vehicle, as a coach on bogies", Coach),
         ("vehicle, as bodies and connectors", Vehicle),
     ):

@@ -31,7 +31,7 @@ from tiengine.scenario.file_paths import absolute_files, absolute_vary
 from tiengine.scenario.gauges import Gauge, check_gauges
 from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
-from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
+from tiengine.scenario.tables import BlowingWind, Contact, Numerics, Output, Track, Train
 from tiengine.track.defects import check_defects
 from tiengine.track.knots import graded_knots
 from tiengine.track.seat_points import seat_points
@@ -63,6 +63,7 @@ class Scenario(Params):
     track: Track = Track()
     irregularity: IrregularityParams = IrregularityParams()
     contact: Contact = Contact()
+    wind: BlowingWind = BlowingWind()
     numerics: Numerics = Numerics()
     output: Output = Output()
     gauges: Annotated[tuple[Gauge, ...], Field(max_length=1000)] = ()
@@ -78,7 +79,7 @@ class Scenario(Params):
     @cached_property
     def parts(self) -> Parts:
         """Parts that the scenario refers to, built and checked once."""
-        return build_parts(self.train, self.track, self.presets)
+        return build_parts(self.train, self.track, self.wind, self.presets)
 
     @cached_property
     def window_length(self) -> float:
@@ -134,11 +135,11 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
     tables = absolute_files(apply_overrides(tables, overrides, Scenario), folder)
     scenario = build(Scenario, tables)
     ensemble = absolute_vary(scenario.ensemble, folder)
-    presets = collect_presets(scenario.train, scenario.track, scenario.presets, folder)
+    presets = collect_presets(scenario.train, scenario.track, scenario.wind, scenario.presets, folder)
     if ensemble.vary:
         for i in range(ensemble.different):
             train = _changed(tables, ensemble, i)
-            presets |= collect_presets(train.train, train.track, presets, folder)
+            presets |= collect_presets(train.train, train.track, train.wind, presets, folder)
     scenario = scenario.model_copy(update={"presets": presets, "ensemble": ensemble})
     _check(scenario)
     _check_members(scenario)

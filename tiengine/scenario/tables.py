@@ -20,9 +20,11 @@ from tiengine.track.defects import FailedFastenings
 from tiengine.track.knots import Grading
 from tiengine.track.mortar import MortarVoid
 from tiengine.vehicle.assembly import Effort
+from tiengine.vehicle.force_history import BodyForce
 from tiengine.vehicle.speed_programme import SpeedProfile
+from tiengine.vehicle.wind import Wind
 
-__all__ = ["Contact", "Numerics", "Output", "Track", "Train"]
+__all__ = ["BlowingWind", "Contact", "Numerics", "Output", "Track", "Train"]
 
 MOST_DEFECTS = 10_000  # of each kind
 MOST_SHAPES = 1000  # of rails, of wheels
@@ -76,6 +78,7 @@ class Train(Params):
     ] = False
     couplings: Annotated[tuple[Coupled, ...], Field(description="tables, see below", max_length=100)] = ()
     wheel_shapes: Annotated[tuple[WheelShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
+    forces: Annotated[tuple[BodyForce, ...], Field(description="tables, see below", max_length=1000)] = ()
     effort: Annotated[
         Effort,
         Field(
@@ -121,6 +124,18 @@ class Track(Params):
         tuple[MortarVoid, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
     rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
+
+
+class BlowingWind(Wind):
+    """Wind on car bodies; absent without its `speed`.
+
+    `speed` is a number, or rows between which it is interpolated smoothly: over the chainage of each car's middle, or
+    over time; the first and last hold beyond them. With a `gust` it is the speed of the mean wind, and the gust of
+    EN 14067-6 ("Chinese hat") stands at `gust_at`: its top is 1.6946 times the mean wind, and it is averaged over the
+    length of each car. Numbers of the gust are from memory.
+    """
+
+    aerodynamics: Annotated[Part, Field(description="part: coefficients of the car bodies")] = "EMU_lead"
 
 
 class Contact(Params):
