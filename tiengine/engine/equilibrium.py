@@ -31,6 +31,7 @@ AT_ONCE = 256  # trial states: those of sixteen vehicles, 1900, would take 200 M
 FORCE_TOLERANCE = 1e-4  # N: a billionth of a wheel load
 EASY_FRICTION = 0.3  # from the guess Newton's method is known to converge
 FRICTION_RATIO = 1.5  # from one friction to the next, where the creep forces change by a few per cent
+FIRST_SHARE, SMALLEST_SHARE = 0.25, 1.0 / 256.0  # of the given loads: a step towards them
 NUDGE_COORDINATE = 1e-8  # m, rad
 NUDGE_RATE = 1e-6  # rad/s
 NUDGE_FORCE = 1.0  # N
@@ -158,8 +159,14 @@ class _Problem:
         self.model, self.track, self.V = model, track, V
         self.train = model.ingredients.train
         self.pitch = self.train.wheelset_dof[:, 3]
-        self.load = self.train.gravity + V_rate * self.train.acceleration_force + given.force[0, 0]
-        self.elongation, self.frame_rate = given.elongation[0, 0], given.frame_rate[0, 0]
+        self._own_load, self._given = self.train.gravity + V_rate * self.train.acceleration_force, given
+        self._give(1.0)
+
+    def _give(self, share: float) -> None:
+        """Let a share of the given loads act."""
+        given = self._given
+        self.load = self._own_load + share * given.force[0, 0]
+        self.elongation, self.frame_rate = share * given.elongation[0, 0], share * given.frame_rate[0, 0]
 
     def split(self, y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Coordinates (B, n), pitch rates (B, W), forces on the rails (B, W, 2, 3)."""
@@ -227,6 +234,8 @@ class _Problem:
         y, size = self._newton(self._guess())
         if size < FORCE_TOLERANCE:
             return y
+        if self.model.ingredients.given and (found := self._approach()) is not None:
+            return found
         reached, y = np.inf, self._guess()
         steps = 1 + max(int(np.ceil(np.log(EASY_FRICTION / wanted) / np.log(FRICTION_RATIO))), 0)
         for friction in np.geomspace(max(EASY_FRICTION, wanted), wanted, steps):
@@ -243,6 +252,26 @@ class _Problem:
             f"numerics.start = 'equilibrium': no steady rolling found at {self.V * 3.6:g} km/h"
             f" (forces out of balance by {size:.3g} N){limit}; use start = 'zero'"
         )
+
+    def _approach(self) -> NDArray[np.float64] | None:
+        """Newton's method from straight track on, the given loads growing by steps that are halved where it fails.
+
+        In a sharp curve the flanges lie against the rails, where the guess, which is made for the treads, is of no use.
+        """
+        self._give(0.0)
+        y, size = self._newton(self._guess())
+        share, step, before = 0.0, FIRST_SHARE, (0.0, y)
+        while size < FORCE_TOLERANCE and share < 1.0 and step > SMALLEST_SHARE:
+            coming = min(share + step, 1.0)
+            self._give(coming)
+            ahead = y if share == 0.0 else y + (coming - share) / (share - before[0]) * (y - before[1])
+            reached, left = self._newton(ahead)
+            if left < FORCE_TOLERANCE:
+                before, share, y, step = (share, y), coming, reached, 2.0 * step
+            else:
+                step *= 0.5
+        self._give(1.0)
+        return y if share == 1.0 else None
 
     def _set_friction(self, friction: float) -> None:
         constants = self.model.constants.copy()

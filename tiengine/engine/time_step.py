@@ -14,7 +14,8 @@ from tiengine.irregularity.irregularity import IrregularityParams
 from tiengine.irregularity.rail_shapes import RailShapes
 from tiengine.irregularity.track_checks import check_step, check_wave, shortest_wavelength
 from tiengine.irregularity.wheel_shapes import WheelTables, wheel_tables
-from tiengine.model.from_scenario import given_sources, ingredients
+from tiengine.model.from_scenario import ingredients
+from tiengine.model.given_sources import given_sources
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
 from tiengine.model.spline_model import DivergingPassesError

@@ -9,18 +9,16 @@ from numpy.typing import NDArray
 
 from tiengine.contact.table_cache import contact_table
 from tiengine.irregularity.wheel_shapes import wheel_tables
+from tiengine.model.given_sources import given_sources
 from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.model.newmark import Newmark
 from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.defects import fastening_factors
 from tiengine.track.slab_matrices import slab_designs
-from tiengine.vehicle.force_history import ForceLoads
-from tiengine.vehicle.given_loads import LoadSource
-from tiengine.vehicle.train import TrainModel, assemble
-from tiengine.vehicle.wind import WindLoads, WindyCar
+from tiengine.vehicle.train import assemble
 
-__all__ = ["given_sources", "ingredients"]
+__all__ = ["ingredients"]
 
 
 def ingredients(scenario: Scenario, dt: float) -> Ingredients:
@@ -66,41 +64,6 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         shaped=bool(shapes or scenario.track.rail_shapes),
         out_of_round=wheel_tables(shapes, parts.wheel_radii) if shapes else None,
     )
-
-
-def given_sources(scenario: Scenario, train: TrainModel) -> tuple[LoadSource, ...]:
-    """Sources of given loads: wind, forces of the scenario; their files are read.
-
-    Args:
-        scenario: Checked scenario.
-        train: Its train.
-
-    Raises:
-        InputError: A file breaks a rule.
-    """
-    parts, forces = scenario.parts, scenario.train.forces
-    bodies = [
-        (vehicle, x, body) for vehicle, x in zip(parts.vehicles, parts.centres, strict=True) for body in vehicle.body
-    ]
-    found: list[LoadSource] = []
-    if parts.aerodynamics is not None:
-        found.append(WindLoads(scenario.wind, parts.aerodynamics, train, _windy_cars(scenario)))
-    if forces:
-        places = [(5 * i, float(bodies[i][1]) + bodies[i][2].x) for i in parts.forced]
-        found.append(ForceLoads(forces, places, train))
-    return tuple(found)
-
-
-def _windy_cars(scenario: Scenario) -> list[WindyCar]:
-    """Car bodies that the wind blows on."""
-    parts, wind, first, cars = scenario.parts, scenario.wind, 0, []
-    for k, (vehicle, x) in enumerate(zip(parts.vehicles, parts.centres, strict=True)):
-        names = [body.name for body in vehicle.body]
-        if wind.vehicles == "all" or k + 1 in wind.vehicles:
-            body = vehicle.body[names.index(wind.body)]
-            cars.append(WindyCar(5 * (first + names.index(wind.body)), float(x) + body.x, vehicle.length, body.height))
-        first += len(names)
-    return cars
 
 
 def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64]]:

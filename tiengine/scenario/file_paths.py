@@ -8,6 +8,7 @@ from typing import Any
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import user_path
 from tiengine.scenario.ensemble import Ensemble
+from tiengine.track.alignment_file import read_alignment
 
 __all__ = ["absolute_files", "absolute_vary"]
 
@@ -16,7 +17,7 @@ FILES = (("irregularity",), ("track", "rail_shapes"), ("train", "wheel_shapes"),
 
 
 def absolute_files(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Make the paths of such files absolute.
+    """Make the paths of such files absolute, and put the rows of an alignment file in the place of its name.
 
     Args:
         tables: Tables of a scenario, not yet checked.
@@ -26,11 +27,24 @@ def absolute_files(tables: dict[str, Any], folder: Path | None) -> dict[str, Any
         The tables, copied where a path has changed.
 
     Raises:
-        InputError: A path leads round in circles.
+        InputError: A path leads round in circles; an alignment file breaks a rule.
     """
     for keys in FILES:
         tables = _changed(tables, keys, "", folder)
-    return tables
+    return _with_alignment(tables, folder)
+
+
+def _with_alignment(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+    """The tables with the rows of an alignment file in the place of its name."""
+    track = tables.get("track")
+    if not isinstance(track, dict) or not isinstance(track.get("alignment_file"), str):
+        return tables
+    name = track["alignment_file"]
+    if track.get("alignment_rows") or track.get("alignment"):
+        raise InputError(f"track.alignment_file = {name!r}: must not be set together with another alignment")
+    rows = read_alignment(user_path(name, folder, "track.alignment_file"), f"track.alignment_file = {name!r}")
+    kept = {key: value for key, value in track.items() if key != "alignment_file"}
+    return {**tables, "track": {**kept, "alignment_rows": rows}}
 
 
 def _changed(value: Any, keys: tuple[str, ...], where: str, folder: Path | None) -> Any:

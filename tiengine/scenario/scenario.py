@@ -17,9 +17,7 @@ import tomli_w
 from pydantic import Field
 
 from tiengine.irregularity.irregularity import IrregularityParams
-from tiengine.irregularity.rail_shapes import check_rail_shapes
 from tiengine.irregularity.track_checks import check_wave
-from tiengine.irregularity.wheel_shapes import check_wheel_shapes
 from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.input_files import load_toml, to_tuples
@@ -31,6 +29,7 @@ from tiengine.scenario.file_paths import absolute_files, absolute_vary
 from tiengine.scenario.gauges import Gauge, check_gauges
 from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
+from tiengine.scenario.shape_checks import check_shapes
 from tiengine.scenario.tables import BlowingWind, Contact, Numerics, Output, Track, Train
 from tiengine.track.defects import check_defects
 from tiengine.track.knots import graded_knots
@@ -47,6 +46,7 @@ LONGEST_RUN = 1e6  # s: the longest distance at 1 m/s
 LONGEST_WINDOW = 2000.0  # m
 MOST_MODES = 3000  # sines of each rail field: the matrices of a rail then take 2 GB
 MOST_KNOTS = 20_000
+STEEPEST_TILT = 0.3  # unbalanced lateral acceleration over g: trains tip over beyond 0.4
 MOST_SPANS_OF_SEAT = 3  # that the points of a seat may reach over: a seat then touches seven splines
 
 
@@ -215,7 +215,9 @@ def _check(scenario: Scenario) -> None:
             f" (wheels over {parts.wheel_span:g} m and {WINDOW_MARGIN_LEAST:g} m at either end)"
         )
     _check_trial_functions(scenario)
-    _check_shapes(scenario)
+    places = parts.wheelset_positions
+    lead = scenario.rear + scenario.centre_in_window + float(places.max())
+    check_shapes(scenario.track, scenario.train, scenario.numerics, len(places), lead)
     duration = scenario.train.distance / min(scenario.train.speed.speed)
     if duration > LONGEST_RUN:
         raise InputError(
@@ -223,7 +225,7 @@ def _check(scenario: Scenario) -> None:
             f" must be at most {LONGEST_RUN:g} s"
         )
     begin = scenario.rear + scenario.centre_in_window
-    adhesion = scenario.train.speed.largest_acceleration(begin, begin + scenario.train.distance) / GRAVITY
+    adhesion = _largest_effort(scenario, begin) / GRAVITY
     if scenario.train.effort == "wheels" and adhesion >= scenario.track.friction:
         raise InputError(
             f"train.speed_kmh: needs an adhesion of {adhesion:.3g}; must be below track.friction ="
@@ -243,6 +245,7 @@ def _check(scenario: Scenario) -> None:
     step = scenario.numerics.time_step
     if step != "auto":
         check_wavelength(scenario, float(step))
+    _check_alignment(scenario, begin)
     check_defects(
         scenario.track.failed_fastenings,
         scenario.track.mortar_voids,
@@ -254,15 +257,34 @@ def _check(scenario: Scenario) -> None:
     )
 
 
-def _check_shapes(scenario: Scenario) -> None:
-    """Check that shapes of rails and wheels belong to rails and wheels of the run, and that its step knows them."""
-    rails, wheels = scenario.track.rail_shapes, scenario.train.wheel_shapes
-    begin = scenario.rear + scenario.centre_in_window + float(scenario.parts.wheelset_positions.max())
-    check_rail_shapes(rails, begin=begin, end=begin + scenario.train.distance)
-    check_wheel_shapes(wheels, len(scenario.parts.wheelset_positions))
-    for key, given in (("track.rail_shapes", rails), ("train.wheel_shapes", wheels)):
-        if given and scenario.numerics.trial_functions == "sines":
-            raise InputError(f'{key}: must be left out with numerics.trial_functions = "sines"; splines know them')
+def _largest_effort(scenario: Scenario, begin: float) -> float:
+    """Largest force on the train per unit mass that its wheels brake or drive with [m/s^2]; an upper bound."""
+    end = begin + scenario.train.distance
+    effort, line = scenario.train.speed.largest_acceleration(begin, end), scenario.track.line
+    if line is None:
+        return effort
+    rear = begin + float(scenario.parts.wheelset_positions.min())
+    places = np.concatenate([[rear, end], line.x[(line.x > rear) & (line.x < end)]])
+    return effort + GRAVITY * float(np.abs(line.lines[2](places)).max())
+
+
+def _check_alignment(scenario: Scenario, begin: float) -> None:
+    """Check that the line is read and that the tilted train stays on it."""
+    track, line = scenario.track, scenario.track.line
+    if track.alignment_file is not None or "track.alignment_file" in scenario.ensemble.vary:
+        raise InputError("track.alignment_file: must be the same for all trains; give track.alignment_rows instead")
+    if line is None:
+        return
+    end = begin + scenario.train.distance
+    x = np.linspace(begin, end, 400)
+    V = np.array([scenario.train.speed.at(float(here))[0] for here in x])
+    tilt = np.abs(line.lateral_acceleration(x, V, GRAVITY))
+    if tilt.max() > STEEPEST_TILT * GRAVITY:
+        i = int(np.argmax(tilt))
+        raise InputError(
+            f"train.speed_kmh: {3.6 * V[i]:.4g} km/h at chainage {x[i]:.5g} m give an unbalanced acceleration of"
+            f" {tilt[i]:.3g} m/s^2; must be at most {STEEPEST_TILT * GRAVITY:.3g} m/s^2 in a curve (track.alignment)"
+        )
 
 
 def _check_trial_functions(scenario: Scenario) -> None:

@@ -27,7 +27,7 @@ PASSING_POINTS = 33
 
 
 def gust_share(distance: Reals, mean: float, angle: float) -> Reals:
-    """What the gust adds, as a share of the mean wind.
+    """Rise of the wind in the gust, as a share of the mean wind.
 
     Args:
         distance: From its top along the track [m], any shape.
