@@ -11,14 +11,17 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from tiengine.engine.aligned import aligned_copy
-from tiengine.engine.banded import BandedBlock, Factors, rail_coefficients, wheel_rows
+from tiengine.engine.banded import BandedBlock, Factors, add_factors, linear_coefficients, wheel_rows
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels.vehicle_columns import DAMPING_COLUMNS, INVERSE_COLUMNS, N_TABLES, STIFFNESS_COLUMNS
 
-__all__ = ["CarTables", "RailTables", "SeatTables", "SlabTables", "Spans", "spans_of"]
+__all__ = ["HALF_WIDTHS", "CarTables", "RailTables", "SeatTables", "SlabTables", "Spans", "spans_of"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+
+HALF_WIDTHS = (7, 11)
+"""Half widths of the bands of the rails' vertical and lateral block."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +109,24 @@ class RailTables:
             gamma_dt: gamma dt [s].
         """
         factors = (
-            Factors.of(vertical.operator(beta_dt2, gamma_dt), 7, vertical.held),
-            Factors.of(lateral.operator(beta_dt2, gamma_dt), 11, lateral.held),
+            Factors.of(vertical.operator(beta_dt2, gamma_dt), HALF_WIDTHS[0], vertical.held),
+            Factors.of(lateral.operator(beta_dt2, gamma_dt), HALF_WIDTHS[1], lateral.held),
         )
+        return cls.of_factors(factors, linear_coefficients(vertical, lateral), spans, wheel_s)
+
+    @classmethod
+    def of_factors(
+        cls, factors: tuple[Factors, Factors], coefficient: Floats, spans: Spans, wheel_s: Floats
+    ) -> RailTables:
+        """Tables from the factors of both blocks and their linear coefficients; the latter are filled up.
+
+        Other arguments as in :meth:`of`.
+        """
         first, shape = spans.at(wheel_s)
         wheels = wheel_rows(factors, first, shape)
+        add_factors(coefficient, factors)
         return cls(
-            coefficient=aligned_copy(rail_coefficients(vertical, lateral, factors).ravel()),
+            coefficient=aligned_copy(coefficient.ravel()),
             wheel_place=wheels.place,
             wheel_rows=wheels.rows.ravel(),
             wheel_shape=shape,

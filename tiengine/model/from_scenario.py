@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         effort=asked.effort,
         couplings=parts.couplings,
     )
+    if scenario.track.line is not None:
+        train = replace(train, K=train.K + train.K_leaning)
     return Ingredients(
         rail=parts.rail,
         fastening=parts.fastening,

@@ -147,18 +147,6 @@ class Track(Params):
     ] = ()
     rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
 
-
-class BlowingWind(Wind):
-    """Wind on car bodies; absent without its `speed`.
-
-    `speed` is a number, or rows between which it is interpolated smoothly: over the chainage of each car's middle, or
-    over time; the first and last hold beyond them. With a `gust` it is the speed of the mean wind, and the gust of
-    EN 14067-6 ("Chinese hat") stands at `gust_at`: its top is 1.6946 times the mean wind, and it is averaged over the
-    length of each car. Numbers of the gust are from memory.
-    """
-
-    aerodynamics: Annotated[Part, Field(description="part: coefficients of the car bodies")] = "EMU_lead"
-
     @property
     def line(self) -> Alignment | None:
         """Curvature, cant and gradient over chainage; None if there are none."""
@@ -171,6 +159,18 @@ def _line(
 ) -> Alignment | None:
     """Line once per value; ``Track.line`` is read many times."""
     return alignment_of(elements, rows, rounding)
+
+
+class BlowingWind(Wind):
+    """Wind on car bodies; absent without its `speed`.
+
+    `speed` is a number, or rows between which it is interpolated smoothly: over the chainage of each car's middle, or
+    over time; the first and last hold beyond them. With a `gust` it is the speed of the mean wind, and the gust of
+    EN 14067-6 ("Chinese hat") stands at `gust_at`: its top is 1.6946 times the mean wind, and it is averaged over the
+    length of each car. Numbers of the gust are from memory.
+    """
+
+    aerodynamics: Annotated[Part, Field(description="part: coefficients of the car bodies")] = "EMU_lead"
 
 
 class Contact(Params):

@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from tiengine.parameters.errors import InputError
 from tiengine.vehicle.connector import Body, Damper, Direction, Joint, Spring, end_motion
 from tiengine.vehicle.coupling import Coupling, placed
+from tiengine.vehicle.preload import LoadedSpring
 from tiengine.vehicle.vehicle import Vehicle
 
 __all__ = ["Assembly", "Effort", "Element", "PlacedBody", "grade_push", "longitudinal_push", "spin_push"]
@@ -79,6 +80,7 @@ class Assembly:
         K: Stiffness, likewise.
         K_push: Stiffness of the longitudinal springs with both ends at their middle height, likewise.
         elements: Nonlinear elements.
+        springs: Springs, for what a leaning train adds.
     """
 
     def __init__(self, bodies: Sequence[PlacedBody], internal: int) -> None:
@@ -93,6 +95,7 @@ class Assembly:
         self.size = self.first_internal + internal
         self.M, self.C, self.K, self.K_push = (np.zeros((self.size, self.size)) for _ in range(4))
         self.elements: list[Element] = []
+        self.springs: list[LoadedSpring] = []
         for i, (_, _, _, body) in enumerate(bodies):
             own = np.arange(6 * i, 6 * i + 6)
             self.M[own, own] = (body.mass, body.mass, body.mass, body.Jx, body.Jy, body.Jz)
@@ -111,8 +114,11 @@ class Assembly:
             columns, B = self._elongation(spring, index)
             self.K[np.ix_(columns, columns)] += B.T * spring.stiffness @ B
             self.C[np.ix_(columns, columns)] += B.T * spring.damping @ B
-            _, B = self._elongation(_levelled(spring), index)
-            _add(self.K_push, columns, B[0], spring.kx)
+            _, level = self._elongation(_levelled(spring), index)
+            _add(self.K_push, columns, level[0], spring.kx)
+            ends = ((spring.a, spring.point_a), (spring.b, spring.point_b))
+            Z_a, Z_b = (self.bodies[index[name]].body.local(point)[2] for name, point in ends)
+            self.springs.append(LoadedSpring(columns, B, level[1], (Z_a, Z_b), spring.ky, spring.kz))
         for damper in vehicle.damper:
             columns, B = self._elongation(damper, index)
             self._add_damper(damper, prefix, columns, B[_AXES[damper.direction]], series)

@@ -26,6 +26,7 @@ from tiengine.parameters.errors import InputError
 from tiengine.vehicle.assembly import Assembly, Effort, Element, PlacedBody, grade_push, longitudinal_push, spin_push
 from tiengine.vehicle.connector import extend_table
 from tiengine.vehicle.coupling import Coupling
+from tiengine.vehicle.preload import leaning_stiffness
 from tiengine.vehicle.vehicle import Vehicle
 
 __all__ = [
@@ -71,6 +72,7 @@ class TrainModel:
         body_height: Centre of gravity above the rails [m], shape (bodies,).
         body_vehicle_x: Centre of each body's vehicle relative to the first's, forward [m], shape (bodies,).
         body_inertia: Roll, pitch and yaw inertia [kg m^2], shape (bodies, 3).
+        K_leaning: Change of K where the train leans, in curves, shape (n, n) (:mod:`tiengine.vehicle.preload`).
         grade_force: Generalised force per unit g sin(gradient) at each body, shape (n, bodies).
         element_index: Coordinates of each nonlinear element, unused 0, shape (n_e, 12).
         element_row: Elongation = row . u, unused 0, shape (n_e, 12).
@@ -101,6 +103,7 @@ class TrainModel:
     body_height: NDArray[np.float64]
     body_vehicle_x: NDArray[np.float64]
     body_inertia: NDArray[np.float64]
+    K_leaning: NDArray[np.float64]
     grade_force: NDArray[np.float64]
     element_index: NDArray[np.int32]
     element_row: NDArray[np.float64]
@@ -254,6 +257,7 @@ def _reduce(
         body_height=np.array([placed.body.height for placed in bodies]),
         body_vehicle_x=np.array([centres[placed.vehicle] for placed in bodies]),
         body_inertia=np.array([(placed.body.Jx, placed.body.Jy, placed.body.Jz) for placed in bodies]),
+        K_leaning=_leaning(full, keep, dofs),
         grade_force=grade[keep],
         element_index=index,
         element_row=row,
@@ -263,6 +267,16 @@ def _reduce(
         element_names=tuple(element.name for element in full.elements),
         element_between_cars=np.array([element.between_cars for element in full.elements], dtype=np.bool_),
     )
+
+
+def _leaning(full: Assembly, keep: NDArray[np.intp], wheelset_dof: NDArray[np.int32]) -> NDArray[np.float64]:
+    """K_leaning, with the preloads of the springs over held wheelsets."""
+    K, weight = full.K[np.ix_(keep, keep)], np.zeros(full.size)
+    weight[2 : full.first_internal : 6] = GRAVITY * np.diag(full.M)[2 : full.first_internal : 6]
+    free = np.setdiff1d(np.arange(len(keep)), wheelset_dof.ravel())
+    u = np.zeros(full.size)
+    u[keep[free]] = np.linalg.lstsq(K[np.ix_(free, free)], weight[keep[free]], rcond=None)[0]
+    return leaning_stiffness(full.springs, u)[np.ix_(keep, keep)]
 
 
 def _gyroscopic(n: int, wheelset_dof: NDArray[np.int32], momentum: NDArray[np.float64]) -> NDArray[np.float64]:
