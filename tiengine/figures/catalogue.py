@@ -77,6 +77,12 @@ KINDS = (
         "Contact should stay on the tread; a second peak near the flange root (negative positions) is flange contact.",
     ),
     Kind(
+        "revolution",
+        "Wheels out of round",
+        "Peaks of the force that follow the tread, revolution after revolution, come from the wheel; the black line is"
+        " the tread, much enlarged. Where the grey band reaches the middle, the wheel has lost contact.",
+    ),
+    Kind(
         "ride",
         "Ride",
         "Floor accelerations over the bogies, in trains of several vehicles of the worst one, filtered as the standards"
