@@ -139,7 +139,8 @@ class Wind(Params):
             return np.full(np.shape(x), mean)
         along = length * (np.arange(PASSING_POINTS) + 0.5) / PASSING_POINTS - 0.5 * length
         distance = np.abs(x[:, None] + along - self.gust_at)
-        return mean * (1.0 + gust_share(distance, abs(mean), np.radians(self.angle)).mean(axis=1))
+        rise = gust_share(distance, abs(mean), float(np.radians(self.angle))).mean(axis=1)
+        return np.asarray(mean * (1.0 + rise), np.float64)
 
 
 class WindyCar(NamedTuple):
