@@ -96,6 +96,12 @@ KINDS = (
         " Filled: the second patch, where wheels may have two.",
     ),
     Kind(
+        "revolution",
+        "Wheels out of round",
+        "Peaks of the force that follow the tread, revolution after revolution, come from the wheel; the black line is"
+        " the tread, much enlarged. Where the grey band reaches the middle, the wheel has lost contact.",
+    ),
+    Kind(
         "ride",
         "Ride",
         "Floor accelerations over the bogies, in trains of several vehicles of the worst one, filtered as the standards"
