@@ -13,9 +13,9 @@ from tiengine.engine.stepper import Stepper
 from tiengine.model.implicit_seats import seat_shapes
 from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
+from tiengine.recording.slab_moments import SlabMoments
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
-from tiengine.track.slab_moments import moment_operator
 
 __all__ = ["SlabEnvelopes", "SlotExtremes"]
 
@@ -93,18 +93,20 @@ class SlabEnvelopes:
     Attributes:
         stepper: Is watched.
         void: Smallest factor of the voids under each slab that has one.
-        shape: Deflection at the nodes and under the seats, moments at the points of :mod:`tiengine.track.slab_moments`.
+        moments: Reads the moments.
+        shape: Deflection at the nodes and under the seats, moments at the places of :mod:`tiengine.track.slab_moments`.
         pressure: Of the mortar; it lags behind, as pressures come at the end of a chunk.
     """
 
     stepper: Stepper
     void: Mapping[int, float]
+    moments: SlabMoments
     shape: SlotExtremes
     pressure: SlotExtremes
 
     def __post_init__(self) -> None:
         """Buffers of a sample."""
-        self._operator, _ = _measures(self.stepper.ingredients)
+        self._places = _deflections(self.stepper.ingredients)
         self._values = np.empty(self.shape.largest.shape)
         self._first: list[int] = []
 
@@ -114,10 +116,11 @@ class SlabEnvelopes:
         void: dict[int, float] = {}
         for each in scenario.track.mortar_voids:
             void[each.slab] = min(each.factor, void.get(each.slab, each.factor))
-        operator, starts = _measures(stepper.ingredients)
+        moments, nodes = SlabMoments(stepper), _deflections(stepper.ingredients).shape[1]
         trains, slots = stepper.state.trains, stepper.state.slots
-        shape = SlotExtremes.of(trains, slots, operator.shape[1], starts)
-        return cls(stepper, void, shape, SlotExtremes.of(trains, slots, 1))
+        starts = (0, nodes, nodes + moments.points)
+        shape = SlotExtremes.of(trains, slots, nodes + 2 * moments.points, starts)
+        return cls(stepper, void, moments, shape, SlotExtremes.of(trains, slots, 1))
 
     @property
     def stage(self) -> str:
@@ -135,8 +138,9 @@ class SlabEnvelopes:
         state = self.stepper.state
         first, motion = state.first_slab, state.slab_motion(DISPLACEMENT)
         self.shape.move(first)
-        slabs = motion.reshape(-1, motion.shape[-1])
-        np.dot(slabs, self._operator, self._values.reshape(len(slabs), -1))
+        nodes = self._places.shape[1]
+        self._values[..., :nodes] = motion @ self._places
+        self.moments.read(self._values[..., nodes:])
         self.shape.add(self._values, self._values)
         self._first.append(first)
 
@@ -188,14 +192,12 @@ class SlabEnvelopes:
         ]
 
 
-def _measures(ingredients: Ingredients) -> tuple[Reals, tuple[int, int, int]]:
-    """Slab coordinates to deflection, M_x, M_y, shape (dofs, points), and the first point of each.
+def _deflections(ingredients: Ingredients) -> Reals:
+    """Slab coordinates to the deflection at the nodes and under the fastenings, shape (dofs, points).
 
-    The deflection is taken at the nodes and under the fastenings: of a coarse mesh no node may be near these.
+    Of a coarse mesh no node may be near the fastenings.
     """
     slab, seats = ingredients.slab, 2 * ingredients.slab.fastenings
-    moments = moment_operator(slab)
-    nodes = np.eye(len(moments))[:, : slab.plate_dofs : 3]
-    places = np.hstack([nodes, seat_shapes(ingredients.designs.matrices[0])[:, :seats]])
-    n, points = places.shape[1], moments.shape[2]
-    return np.hstack([places, moments[:, 0], moments[:, 1]]), (0, n, n + points)
+    shapes = seat_shapes(ingredients.designs.matrices[0])
+    nodes = np.eye(len(shapes))[:, : slab.plate_dofs : 3]
+    return np.hstack([nodes, shapes[:, :seats]])

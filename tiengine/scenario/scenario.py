@@ -29,6 +29,7 @@ from tiengine.scenario.gauges import Gauge, check_gauges
 from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
+from tiengine.track.baseplate import check_baseplate
 from tiengine.track.defects import check_defects
 from tiengine.track.knots import graded_knots
 from tiengine.track.seat_points import seat_points
@@ -261,6 +262,7 @@ def _check(scenario: Scenario) -> None:
     step = scenario.numerics.time_step
     if step != "auto":
         check_wavelength(scenario, float(step))
+    check_baseplate(parts.slab, parts.fastening.baseplate)
     check_defects(
         scenario.track.failed_fastenings,
         scenario.track.mortar_voids,
