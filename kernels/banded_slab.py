@@ -182,6 +182,15 @@ def clear_loads(slab: Array, base: int, dofs: int):
 
 
 @ti.func
+def record_motion(slab: Array, base: int, dofs: int, out: int, record_out: Array):
+    """Copy a group's displacements, rates and accelerations to ``record_out``, in turn, from row ``out`` on."""
+    for i in range(dofs):
+        s = (base + i) * at.SLAB_ROWS
+        for m in ti.static(range(3)):
+            record_out[out + 3 * i + m] = slab[s + at.U + m]
+
+
+@ti.func
 def bed_forces(
     b: int, slot: int, base: int, row_u: int, row_v: int, dofs: int, design: int, index: Array, shape: Array,
     weight: Array, factor: Array, rest: Array, lateral_K: Array, lateral_C: Array, numbers: Array, slab: Array,

@@ -75,7 +75,7 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
     @ti.kernel
     def spline_steps(
         job: Ints1,
-        record: Ints2,
+        record: Ints1,
         size: Ints1,
         dims: Ints1,
         constants: Reals1,
@@ -93,6 +93,7 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
         slab: eights,
         slab_seat: eights,
         slab_design: eights,
+        slab_record: eights,
         slab_coefficient: Reals1,
         slab_seat_index: Ints3,
         slab_seat_shape: Reals4,
@@ -198,8 +199,9 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
                 if stages & at.CAR_STAGE:
                     for b in range(b0, b_end):
                         cars.loads(
-                            b, row_u, row_v, V_rate, size, dims, car_load, wheelset_place, wheel, wheelset_force,
-                            element_place, element_row, element_kind, element_linear, element_table, car, blocks,
+                            b, row_u, row_v, V_rate, cars.load_row(b, step, size, blocks), size, dims, car_load,
+                            wheelset_place, wheel, wheelset_force, element_place, element_row, element_kind,
+                            element_linear, element_table, car, blocks,
                         )  # fmt: skip
                         for i in range(size[at.CARS]):
                             base = b * train_car + i * at.CAR_ROWS * blocks
@@ -215,13 +217,13 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
                     tolerance, row = ct.ITERATE_TOLERANCE * constants[layout.STATIC_LOAD], -1
                     if last_pass == 1:
                         tolerance = constants[layout.CONTACT_TOLERANCE] * constants[layout.STATIC_LOAD]
-                        row = record[step, 0]
+                        row = step
                     for b in range(b0, b_end):
                         wheels.contact_of_train(
                             b, c, 2 * (b - b0), step, V, tolerance, row, dims, constants, wheel_place,
                             wheelset_place, car_columns_start, car_columns, wheel, table, irregularity,
                             wheelset_compliance, coupling, contact, force, wheelset_force, rail_force, iterations,
-                            wheel_record, car, under, size[at.CARS], blocks,
+                            wheel_record, car, under, car_load, size, blocks,
                         )  # fmt: skip
                     wheels.add_wheel_columns(c, first, dims, wheel_place, wheel_rows, rail, under)
                 if stages & at.BACKWARD_STAGE:
@@ -231,10 +233,10 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
                         cars.correct(car, i * at.CAR_ROWS * blocks, beta_dt2, gamma_dt, blocks)
                         if ahead == 1:
                             cars.predict(car, i * at.CAR_ROWS * blocks, constants, blocks)
-                    if last_pass == 1 and record[step, 1] >= 0:
+                    if last_pass == 1 and record[step] >= 0:
                         for b in range(b0, b_end):
                             cars.record_bodies(
-                                b, record[step, 1], b * train_car * 8, vehicle_place, car, body_record, blocks
+                                b, record[step], b * train_car * 8, vehicle_place, car, body_record, blocks
                             )
                 if stages & at.EXCHANGE_STAGE:
                     seats.loads_on_slabs(c, trains_a_chunk, size, dims, seat_place, seat, slab_seat)
@@ -258,6 +260,13 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
                         if p == 0:
                             sweep_slabs(b, dofs, 0, size, constants, slab_design, slab, slab_coefficient, K)
                         sweep_slabs(b, dofs, 1, size, constants, slab_design, slab, slab_coefficient, K)
+                    if last_pass == 1 and record[step] >= 0:
+                        for b in range(b0, b_end):
+                            for g in range(groups):
+                                row = (b * body_record.shape[1] + record[step]) * groups + g
+                                slabs.record_motion(
+                                    slab, (b * groups + g) * (dofs + 2 * K) + K, dofs, row * 3 * dofs, slab_record
+                                )
                     if ahead == 1:
                         for g in range(b0 * groups, (b0 + trains_a_chunk) * groups):
                             slabs.predict(slab, g * (dofs + 2 * K) + K, dofs, constants)

@@ -28,7 +28,7 @@ class Explicit:
     ) -> None:
         """Bind to a state and a window position, clock of shape (1, N_CLOCK)."""
         model = model if constants is None else replace(model, constants=constants)
-        chunk = Chunk.empty(model.ingredients, 1, 1, 1)
+        chunk = Chunk.empty(model.ingredients, 1, 1)
         chunk.clock[:] = clock
         self.state, self.stepper, self.model = state, SineStepper(model, state, chunk), model
         self.stepper.move(0)

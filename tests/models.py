@@ -54,7 +54,7 @@ class Run:
         self.state = state_at_rest(model)
         if start:
             equilibrium(model, self.state, X, V)
-        self.chunk = Chunk.empty(model.ingredients, steps, steps, steps)
+        self.chunk = Chunk.empty(model.ingredients, steps, steps)
         self.stepper = make_stepper(model, self.state, self.chunk)
 
     def advance(self, steps: int, irregularity: NDArray[np.float64] | None = None) -> NDArray[np.float64]:

@@ -17,18 +17,22 @@ if TYPE_CHECKING:
     from tiengine.scenario.scenario import load_scenario as load_scenario
     from tiengine.simulation.simulate import resume as resume
     from tiengine.simulation.simulate import run as run
+    from tiengine.study.study import Study as Study
+    from tiengine.study.study import study as study
 
 __version__ = metadata.version("tiengine")
-__all__ = ["InputError", "Result", "TrackFunction", "load_scenario", "open", "resume", "run"]
+__all__ = ["InputError", "Result", "Study", "TrackFunction", "load_scenario", "open", "resume", "run", "study"]
 
 _HOMES = {
     "InputError": "tiengine.parameters.errors",
     "Result": "tiengine.result",
+    "Study": "tiengine.study.study",
     "TrackFunction": "tiengine.irregularity.track_function",
     "load_scenario": "tiengine.scenario.scenario",
     "open": "tiengine.result",
     "resume": "tiengine.simulation.simulate",
     "run": "tiengine.simulation.simulate",
+    "study": "tiengine.study.study",
 }
 
 

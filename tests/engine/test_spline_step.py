@@ -88,7 +88,7 @@ def test_any_lanes_and_any_place_give_the_same_bits() -> None:
     """Seeds go by train, so that train b is the same alone and in a batch."""
 
     def bits(given: Bed, b: int) -> list[NDArray[np.float64]]:
-        given.step.record[:] = np.arange(len(given.step.record))[:, None]
+        given.step.record[:] = np.arange(len(given.step.record))
         given.step(0)
         given.step(1, 3)
         state = motion_of(given, b)

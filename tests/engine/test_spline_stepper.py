@@ -14,6 +14,7 @@ from tiengine.engine.model_tables import ModelTables, coupled_coordinates
 from tiengine.engine.spline_state import SplineState
 from tiengine.engine.spline_stepper import REFACTOR, SplineStepper
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, PARTS, VELOCITY
+from tiengine.engine.stepper import Plan
 from tiengine.kernels import layout as at
 from tiengine.model.spline_model import SplineModel
 from tiengine.recording.seat_envelopes import SeatEnvelopes, watched_seats
@@ -30,7 +31,7 @@ def stepper_of(model: SplineModel, steps: int, X: float = 0.0, V: float = V350) 
     """A step from steady rolling."""
     state = SplineState.at_rest(model)
     equilibrium(model, state, X, V)
-    return SplineStepper(model, state, Chunk.empty(model.ingredients, steps, steps, steps))
+    return SplineStepper(model, state, Chunk.empty(model.ingredients, steps, steps))
 
 
 def load(
@@ -117,7 +118,7 @@ def test_arrays_carry_a_run_on_with_the_same_bits() -> None:
     load(whole, X, rough=1e-5)
     for i in range(30):
         whole.step(i, i, i)
-    half = SplineStepper(model, SplineState.at_rest(model), Chunk.empty(model.ingredients, 60, 60, 60))
+    half = SplineStepper(model, SplineState.at_rest(model), Chunk.empty(model.ingredients, 60, 60))
     for name, target in half.state.arrays().items():
         target[...] = whole.state.arrays()[name]
     half.state.first_seat, half.state.first_slab = whole.state.first_seat, whole.state.first_slab
@@ -193,10 +194,10 @@ def test_steps_may_be_put_off() -> None:
             if (stepper.rows.step + 1) % 5 == 0:
                 force.append(stepper.state.normal_force.copy())
 
-        stepper.watch("look", look, due=lambda stepper=stepper, every=every: (stepper.rows.step + 1) % every == 0)
+        stepper.watch("look", look, due=lambda plan, every=every: (plan.step + 1) % every == 0)
         load(stepper, 5.6 + V350 * 2e-4 * np.arange(1, 101), rough=1e-5)
-        for i in range(100):
-            stepper.step(i, i, i // 10 if i % 10 == 9 else -1)
+        steps = np.arange(100)
+        stepper.take(Plan(steps, steps, np.where(steps % 10 == 9, steps // 10, -1)))
         found.append((np.array(force), stepper.chunk.wheel[:, :100], stepper.chunk.body[:, :10]))
     for one, many in zip(*found, strict=True):
         np.testing.assert_array_equal(one, many)

@@ -76,7 +76,7 @@ def growth(name: str, changes: dict[str, object]) -> float | None:
         assert "unstable" in str(refused)  # noqa: PT017 - only then is there nothing to march
         return None
     V, g = scenario.train.speed.fastest, model.ingredients
-    state, chunk = state_at_rest(model), Chunk.empty(g, MARCHED, MARCHED, 1)
+    state, chunk = state_at_rest(model), Chunk.empty(g, MARCHED, 1)
     equilibrium(model, state, 0.0, V)
     stepper = make_stepper(model, state, chunk)
     noise = np.zeros_like(chunk.irregularity)

@@ -93,7 +93,7 @@ class OtherStepper(Stepper):
 
     def __init__(self, steps: int) -> None:
         state = OtherState()
-        super().__init__(state.ingredients, state, Chunk.empty(state.ingredients, steps, steps, steps))
+        super().__init__(state.ingredients, state, Chunk.empty(state.ingredients, steps, steps))
         self.log: list[str] = []
         self.factored_speed = 0.0
         self.bind()
@@ -111,13 +111,15 @@ class OtherStepper(Stepper):
         state.seats[:, 0] = 1e3 * (1 + self.rows.step)
         if self.rows.body >= 0:
             self.chunk.body[:, self.rows.body] = np.arange(3)[:, None]
-        if self.rows.wheel >= 0:
-            self.chunk.wheel[:, self.rows.wheel] = self.rows.step
+            self.chunk.slab[:, self.rows.body, 0] = state.slab_motion(0)
+            self.chunk.rear_slab[self.rows.body] = state.first_slab
+        self.chunk.wheel[:, self.rows.step] = self.rows.step
 
     def factor(self, V: float) -> None:
         self.factored_speed = V
 
     def finish(self, body_rows: int) -> None:
+        self.chunk.filled = body_rows
         self.chunk.mortar[:, :body_rows, :, 0] = 1.0
 
     def compile(self) -> float:
@@ -182,8 +184,7 @@ def test_another_kind_of_step_is_recorded():
     steps, scenario = 40, recorded()
     stepper = loaded(steps)
     recorder, trackside = Recorder(scenario, DT), Trackside.watching(scenario, stepper)
-    for row in recorder.rows(0, steps):
-        stepper.step(*row)
+    stepper.take(recorder.plan(0, steps))
     stepper.finish(recorder.body_rows(0, steps))
     ingredients = stepper.ingredients
     position = stepper.chunk.clock[:, 0] + ingredients.centre_s

@@ -75,7 +75,7 @@ def rail_period_error(dt: float) -> float:
     model = paper_model(modes=24, V=1e-9, dt=dt, passes=16, seat_factors=lambda first, count: np.zeros((count, 2)))
     state = SineState.at_rest(model)
     steps = round(5e-3 / dt)
-    chunk = Chunk.empty(model.ingredients, steps, 1, 1)
+    chunk = Chunk.empty(model.ingredients, steps, 1)
     stepper = SineStepper(model, state, chunk)
     r = model.ingredients.rail
     mode = 7

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from threadpoolctl import threadpool_limits
 
 from tiengine.cli.commands import main
-from tiengine.engine.stepper import BETWEEN_STEPS, Stage, Stepper
+from tiengine.engine.stepper import BETWEEN_STEPS, Plan, Stage, Stepper
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.profiling import profile as profiling
@@ -96,6 +96,11 @@ class Steps(Stepper):
         return 0.0
 
 
+def planned(steps: int) -> Plan:
+    """Steps without samples."""
+    return Plan(np.arange(steps), *2 * [np.full(steps, -1)])
+
+
 def test_timers_put_every_interval_to_its_stage(monkeypatch):
     """On a clock that only the stages move: one reading where the name changes, the rest between the steps."""
     now = [0]
@@ -103,10 +108,10 @@ def test_timers_put_every_interval_to_its_stage(monkeypatch):
     def spend(ns: int):
         return lambda *arguments: now.__setitem__(0, now[0] + ns)
 
-    def take(stepper: Stepper, rows: list[tuple[int, int, int]]) -> None:
-        for row in rows:
+    def take(stepper: Stepper, plan: Plan) -> None:
+        for i in plan.step:
             now[0] += 100
-            stepper.step(*row)
+            stepper.step(i)
             now[0] += 1000
 
     monkeypatch.setattr(timed_loop, "time", SimpleNamespace(perf_counter_ns=lambda: now[0]))
@@ -114,7 +119,7 @@ def test_timers_put_every_interval_to_its_stage(monkeypatch):
     stepper = Steps(("rails", spend(3)), ("slabs", spend(5)), ("own", spend(7)), ("contact", spend(11)))
     stepper.watch("own", spend(1))
     times = Times.of(stepper)
-    assert StageTimer(times, 1).take_timed(stepper, [(0, -1, -1), (1, -1, -1)]) == 2 * 1127
+    assert StageTimer(times, 1).take_timed(stepper, planned(2)) == 2 * 1127
     assert times.stages == {"linear forces": 16, "own": 16, "contact": 22, BETWEEN_STEPS: 2200}
     assert times.timed == [27, 27]
     assert times.calls == {"linear forces": 2, "own": 2, "contact": 1}
@@ -129,7 +134,7 @@ def test_blocks_take_turns(monkeypatch):
     taken: list[tuple[bool, int]] = []
     stepper = Steps(("own", lambda: taken.append((stepper._mark is not None, stepper.rows.step))))
     times = Times.of(stepper)
-    StageTimer(times, 2).take(stepper, [(i, -1, -1) for i in range(7)])
+    StageTimer(times, 2).take(stepper, planned(7))
     assert taken == [(i in (2, 3, 6), i) for i in range(7)]
     assert (times.plain_steps, times.timed_steps, len(times.blocks)) == (4, 3, 2)
 
@@ -141,7 +146,7 @@ def test_measuring_changes_no_bit():
     bare.advance(20)
     X = V350 * model.ingredients.newmark.dt * np.arange(1, 21)
     watched.stepper.load(X, np.full(20, V350), np.zeros(20), np.zeros_like(watched.chunk.irregularity))
-    StageTimer(Times.of(watched.stepper), 10).take_timed(watched.stepper, [(i, i, i) for i in range(20)])
+    StageTimer(Times.of(watched.stepper), 10).take_timed(watched.stepper, Plan(*3 * [np.arange(20)]))
     np.testing.assert_array_equal(watched.state.motion, bare.state.motion)
     np.testing.assert_array_equal(watched.chunk.wheel, bare.chunk.wheel)
 

@@ -13,7 +13,7 @@ LONGEST = 400  # lines; 300 is the aim
 
 WINGS = (
     "kernels", "parameters", "result_files", "contact", "vehicle", "track", "irregularity", "scenario", "indices",
-    "result", "model", "engine", "recording", "simulation", "figures", "report", "profiling", "cli",
+    "result", "model", "engine", "recording", "simulation", "figures", "report", "profiling", "study", "cli",
 )  # fmt: skip
 """From the ground up: a wing imports only from itself and from wings before it in this list."""
 

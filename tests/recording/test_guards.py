@@ -9,6 +9,7 @@ from tiengine.engine.chunk import Chunk
 from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.state import PARTS, VELOCITY
 from tiengine.engine.stepper import Rows
+from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recording.guards import Guard, climbing_shift
 from tiengine.scenario.event_policy import Events
@@ -26,12 +27,12 @@ def guard() -> Guard:
     return guard_of(Events())
 
 
-def guard_of(policy: Events, track_end: float = np.inf) -> Guard:
+def guard_of(policy: Events, track_end: float = np.inf, steps: int = 1) -> Guard:
     model = model_of("smooth", dt=STEP)
     state = state_at_rest(model)
     state.enter(0, 0)
     state.normal_force[...] = 7e4
-    stepper = make_stepper(model, state, Chunk.empty(model.ingredients, 1, 1, 1))
+    stepper = make_stepper(model, state, Chunk.empty(model.ingredients, steps, 1))
     return Guard.watching(stepper, policy, np.full(1, track_end))
 
 
@@ -143,11 +144,11 @@ def test_the_scenario_decides(guard: Guard):
 @pytest.mark.parametrize("policy", ["stop", "record"])
 def test_forces_that_alternate_from_step_to_step(policy: str):
     """A lateral force of 5 kN to and fro: found once it has lasted for 0.1 s, in a look every 20 ms."""
-    guard = guard_of(Events(oscillation=policy))
+    guard = guard_of(Events(oscillation=policy), steps=1000)
     guard.load(0, np.arange(1000.0))
     for i in range(1000):
         guard.stepper.rows = Rows(i)
-        guard.state.forces_on_rails[0, 1, 0, 1] = 5e3 * np.exp(1e-3 * i) * (-1) ** i
+        guard.stepper.chunk.wheel[0, i, 1, 0, at.LATERAL_FORCE] = 5e3 * np.exp(1e-3 * i) * (-1) ** i
         guard.watch_step()
     event = only(guard)
     assert (event.kind, event.wheelset, event.side, event.stops) == ("oscillation", 2, "left", policy == "stop")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiengine.recording.step_oscillation import StepOscillation
+from tiengine.recording.step_oscillation import WINDOW, StepOscillation
 
 DT, LOAD = 2e-4, 7e4
 INTERVAL = StepOscillation.interval(DT)
@@ -15,16 +15,15 @@ def found(signal, dt=DT) -> float | None:
     """Time at which an oscillation of the lateral force of one wheel of one train is found [s]; None: it is not."""
     interval = StepOscillation.interval(dt)
     watch = StepOscillation.none(1, 2)
-    force = np.zeros((1, 2, 2, 2))
+    force = np.zeros((1, len(signal), 2, 2, 2))
     force[..., 0] = LOAD
-    for step in range(1, len(signal) + 1):
-        force[0, 1, 0, 1] = signal[step - 1]
-        if watch.sample(step, interval, force):
-            oscillates, size = watch.look(interval * dt, LOAD)
-            if oscillates.any():
-                assert np.argwhere(oscillates).tolist() == [[0, 1, 0]]
-                assert size[0, 1, 0] == pytest.approx(abs(alternating(signal, step)), rel=0.3)
-                return step * dt
+    force[0, :, 1, 0, 1] = signal
+    for step in range(interval, len(signal) + 1, interval):
+        oscillates, size = watch.look(force[:, step - WINDOW : step], interval * dt, LOAD)
+        if oscillates.any():
+            assert np.argwhere(oscillates).tolist() == [[0, 1, 0]]
+            assert size[0, 1, 0] == pytest.approx(abs(alternating(signal, step)), rel=0.3)
+            return step * dt
     return None
 
 

@@ -103,7 +103,7 @@ def run_steps(
     else:
         release(model, state, 0.0)
     track = make_irregularity(given.irregularity, float(model.ingredients.wheel_s.max()))
-    chunk = Chunk.empty(model.ingredients, CHUNK, CHUNK, CHUNK)
+    chunk = Chunk.empty(model.ingredients, CHUNK, CHUNK)
     stepper = make_stepper(model, state, chunk, **options)
     steps = round(duration / dt)
     wheels, bodies = [], []

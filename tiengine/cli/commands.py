@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import click
 
-from tiengine.cli import reading, simulating
+from tiengine.cli import reading, simulating, studying
 from tiengine.cli.screen import print_rows, show
 from tiengine.parameters.errors import InputError, InputNote
 from tiengine.parameters.presets import KINDS, preset_names, preset_source
@@ -184,7 +184,7 @@ def list_presets(kind: str | None) -> None:
         print_rows([(f"  {name}", preset_source(each, name)) for name in preset_names(each)])
 
 
-for _command in (*simulating.COMMANDS, *reading.COMMANDS):
+for _command in (*simulating.COMMANDS, *reading.COMMANDS, *studying.COMMANDS):
     main.add_command(_command)
 
 

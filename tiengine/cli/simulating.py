@@ -25,7 +25,7 @@ from tiengine.result_files.summary import summary
 if TYPE_CHECKING:
     from tiengine.result import Result
 
-__all__ = ["COMMANDS"]
+__all__ = ["COMMANDS", "Stop", "stopped_by_signals"]
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -116,7 +116,7 @@ def _run_on_screen(simulation: Callable[..., Result], path: Path, name: str, tra
     from tiengine.parameters.errors import RunFailedError, RunStoppedError
 
     console = Console(stderr=True, quiet=quiet, highlight=False)
-    with _stopped_by_signals(console) as stop:
+    with stopped_by_signals(console) as stop:
         try:
             with _progress(console, name, trains) as progress:
                 result = simulation(
@@ -142,7 +142,7 @@ def _run_on_screen(simulation: Callable[..., Result], path: Path, name: str, tra
 
 
 @dataclass
-class _Stop:
+class Stop:
     """Stop request by a signal.
 
     Attributes:
@@ -158,9 +158,13 @@ class _Stop:
 
 
 @contextmanager
-def _stopped_by_signals(console: Console) -> Iterator[_Stop]:
-    """Let Ctrl-C and SIGTERM request a stop after the current chunk of steps; a second signal exits at once."""
-    stop = _Stop()
+def stopped_by_signals(console: Console) -> Iterator[Stop]:
+    """Let Ctrl-C and SIGTERM request a stop after the current chunk of steps; a second signal exits at once.
+
+    Args:
+        console: Says so, unless it is quiet.
+    """
+    stop = Stop()
 
     def request(number: int, frame: Any) -> None:
         if stop.requested:

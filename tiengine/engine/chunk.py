@@ -8,7 +8,7 @@ import numpy as np
 
 from tiengine.kernels import layout as at
 from tiengine.model.ingredients import Ingredients
-from tiengine.parameters.arrays import Reals
+from tiengine.parameters.arrays import Ints, Reals
 
 __all__ = ["Chunk"]
 
@@ -20,26 +20,35 @@ class Chunk:
     Attributes:
         clock: Window at the end of each step, shape (steps, N_CLOCK).
         irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
-        wheel: Recorded wheel output, shape (B, rows, W, 2, N_WHEEL).
+        wheel: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL).
         body: Recorded displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
-        mortar: Largest and smallest pressure of each slab [Pa], with the bodies, shape (B, rows, slots, 2).
+        slab: Displacement, velocity, acceleration of the slabs' coordinates, with the bodies, shape (B, rows, 3, slots,
+            dofs).
+        rear_slab: Rear slab in memory then, shape (rows,); slab i is in slot i modulo their number.
+        mortar: Largest and smallest pressure of each slab then [Pa], shape (B, rows, slots, 2).
+        filled: Rows of the bodies' record that the last steps have filled.
     """
 
     clock: Reals
     irregularity: Reals
     wheel: Reals
     body: Reals
+    slab: Reals
+    rear_slab: Ints
     mortar: Reals
+    filled: int = 0
 
     @classmethod
-    def empty(cls, ingredients: Ingredients, steps: int, wheel_rows: int, body_rows: int) -> Chunk:
-        """Buffers for ``steps`` steps of which some are recorded."""
+    def empty(cls, ingredients: Ingredients, steps: int, body_rows: int) -> Chunk:
+        """Buffers for ``steps`` steps, some of which record the bodies."""
         train, B = ingredients.train, ingredients.trains
-        W, bodies = len(train.wheelset_x), len(train.body_names)
+        W, bodies, rows, slots = len(train.wheelset_x), len(train.body_names), max(body_rows, 1), ingredients.slots
         return cls(
             clock=np.zeros((steps, at.N_CLOCK)),
             irregularity=np.zeros((B, steps, W, at.N_IRREGULARITY)),
-            wheel=np.zeros((B, max(wheel_rows, 1), W, 2, at.N_WHEEL)),
-            body=np.zeros((B, max(body_rows, 1), 3, 5 * bodies)),
-            mortar=np.zeros((B, max(body_rows, 1), ingredients.slots, 2)),
+            wheel=np.zeros((B, steps, W, 2, at.N_WHEEL)),
+            body=np.zeros((B, rows, 3, 5 * bodies)),
+            slab=np.zeros((B, rows, 3, slots, ingredients.designs.matrices[0].n)),
+            rear_slab=np.zeros(rows, dtype=np.int64),
+            mortar=np.zeros((B, rows, slots, 2)),
         )

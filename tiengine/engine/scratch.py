@@ -28,9 +28,6 @@ class Scratch:
         slab_pull: Forces at the seats by their motion, at the predictors and at the iterate, moments over b^2,
             shape (2, B, slots, 5, n).
         slab_force: Forces of the seats on the slabs, shape (B, slots, 5, n).
-        bed_motion: Bed's k u + c v of the slabs, shape (B slots dofs,).
-        bed: The same where the bodies are recorded, shape (B, rows, slots dofs).
-        design: Design of the slab in each slot then, shape (rows, slots).
         damped: Acceleration of slabs, then trains, by their own damping, shape (columns,).
         rail_predicted: Rails under the wheels at the predictors: w, v, theta_x, slopes, rates, shape (B, W, 2, 9).
     """
@@ -43,15 +40,12 @@ class Scratch:
     slab_factor: NDArray[np.float64]
     slab_pull: NDArray[np.float64]
     slab_force: NDArray[np.float64]
-    bed_motion: NDArray[np.float64]
-    bed: NDArray[np.float64]
-    design: NDArray[np.int32]
     damped: NDArray[np.float64]
     rail_predicted: NDArray[np.float64]
 
     @classmethod
-    def of(cls, model: SineModel, body_rows: int) -> Scratch:
-        """Zeros of the model's sizes, for a chunk with some records of the bodies."""
+    def of(cls, model: SineModel) -> Scratch:
+        """Zeros of the model's sizes."""
         sizes = (at.TRAINS, at.MODES, at.SEATS, at.WHEELSETS, at.SLOTS, at.SLAB_DOFS, at.SEATS_PER_SLAB)
         B, N, seats, W, slots, dofs, per_slab = (int(model.dims[size]) for size in sizes)
         vehicle = int(model.dims[at.VEHICLE_DOFS])
@@ -64,9 +58,6 @@ class Scratch:
             slab_factor=np.zeros((B, slots, dofs)),
             slab_pull=np.zeros((2, B, slots, 5, per_slab)),
             slab_force=np.zeros((B, slots, 5, per_slab)),
-            bed_motion=np.zeros(B * slots * dofs),
-            bed=np.zeros((B, body_rows, slots * dofs)),
-            design=np.zeros((body_rows, slots), dtype=np.int32),
             damped=np.zeros(B * (slots * dofs + vehicle)),
             rail_predicted=np.zeros((B, W, 2, 9)),
         )

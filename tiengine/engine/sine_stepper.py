@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.bed_pressure import fill_pressures
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.launch import Launch
+from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.scratch import Scratch
 from tiengine.engine.sine_state import SineState
 from tiengine.engine.stepper import Call, Stage, Stepper
@@ -50,17 +52,21 @@ class SineStepper(Stepper):
             public: Public Taichi calls only.
         """
         super().__init__(model.ingredients, state, chunk)
-        self.model, self.scratch = model, Scratch.of(model, chunk.body.shape[1])
+        self.model, self.scratch = model, Scratch.of(model)
         passes = model.ingredients.passes
         self._tick = np.zeros((passes, at.N_TICK), dtype=np.int32)
         self._tick[:, at.PASS] = np.arange(passes)
         self._tick[-1, at.LAST_PASS] = 1
+        n = model.ingredients.train.n
+        self.loads = LoadRows(
+            model.ingredients, model.vehicle_load, np.arange(n, dtype=np.int32), n, 1, len(chunk.clock)
+        )
+        self._tick[:, at.LOAD_STEP], self._tick[:, at.LOAD_TRAIN] = self.loads.step, self.loads.train
         self._launches: list[Launch] = []
         self._parallel, self._public = parallel, public
         self.factored_speed = float("nan")
         self._window = (-1, -1)
         self._odd: list[tuple[int, int]] = []
-        self._slabs = slice(int(model.dims[at.SLABS]), int(model.dims[at.VEHICLES]))
         self._explicit_bed = int(model.dims[at.MORTAR_MODE]) > 0
         self._force, self._acceleration = (
             {block: _rows(state.view(row, block)) for block in _BLOCKS} for row in (at.F, at.A)
@@ -86,10 +92,10 @@ class SineStepper(Stepper):
 
     def _enter(self) -> None:
         """Begin a step: let seats and slabs in and out where they change."""
-        i, wheel_row, _ = self.rows
+        i = self.rows.step
         if self.moves[i]:
             self.move(i)
-        self._tick[:, _ROWS] = i, wheel_row
+        self._tick[:, at.STEP] = i
 
     def _predict(self) -> Iterator[Stage]:
         """Predictors; shapes of the seats at their places at the end, factors of the products, rails under wheels."""
@@ -173,7 +179,7 @@ class SineStepper(Stepper):
         train, table = self.ingredients.train, self.ingredients.contact.values
         return self._launch(
             kernels.forces_and_contact, tick, _ITERATE if number else _PREDICTED, m.dims, m.constants, chunk.clock,
-            m.stiffness, k.drift, s.seat_scale, k.seat_shape, k.rail_pull, k.slab_pull, m.vehicle_load,
+            m.stiffness, k.drift, s.seat_scale, k.seat_shape, k.rail_pull, k.slab_pull, self.loads.array,
             train.wheelset_dof, m.wheel, train.element_index, train.element_row, train.element_kind,
             train.element_linear, train.element_table, table, chunk.irregularity, m.wheel_shape, b.wheelset_compliance,
             b.rail_coupling, b.rail_answer, b.vehicle_answer, s.motion, s.seat_force, k.slab_force, k.rail_predicted,
@@ -193,32 +199,19 @@ class SineStepper(Stepper):
         row = self.rows.body
         if row < 0:
             return
-        chunk, state, k = self.chunk, self.state, self.scratch
+        chunk, state = self.chunk, self.state
         for kind in range(3):
             chunk.body[:, row, kind] = state.body_motion(kind)
+            chunk.slab[:, row, kind] = state.slab_motion(kind)
+        chunk.rear_slab[row] = state.first_slab
         if self._explicit_bed:
             chunk.mortar[:, row] = state.pressure
-        else:
-            np.dot(self.model.bed_numbers[:2], state.motion[at.U : at.A, self._slabs], k.bed_motion)
-            k.bed[:, row] = k.bed_motion.reshape(len(k.bed), -1)
-            k.design[row] = state.design[0]
 
     def finish(self, body_rows: int) -> None:
-        """Extreme pressures of a wholly implicit bed, where the bodies were recorded.
-
-        At rest they are those of the slab's weight; k u + c v adds to them. One product for a whole chunk of steps.
-        """
-        m, k, rows = self.model, self.scratch, body_rows
-        if rows == 0 or self._explicit_bed:  # then they are known from the forces
-            return
-        kinds = k.design[:rows].ravel()
-        factor, at_rest = (values.reshape(len(values), -1)[kinds] for values in (m.bed_factor, m.bed_rest))
-        for bed, out in zip(k.bed[:, :rows], self.chunk.mortar[:, :rows], strict=True):
-            pressure = bed.reshape(len(kinds), -1) @ m.bed_points
-            pressure *= factor
-            pressure += at_rest
-            out[..., 0] = pressure.max(axis=1).reshape(out.shape[:2])
-            out[..., 1] = pressure.min(axis=1).reshape(out.shape[:2])
+        """Compute the pressures of a wholly implicit bed."""
+        self.chunk.filled = body_rows
+        if not self._explicit_bed:  # else they are known from the forces
+            fill_pressures(self.model, self.chunk)
 
     def _by_design(
         self, factor: NDArray[np.float64], matrices: NDArray[np.float64], out: NDArray[np.float64], add: bool = False
@@ -280,4 +273,3 @@ def _product(factor: NDArray[np.float64], matrix: NDArray[np.float64], out: NDAr
 _BLOCKS = ("vertical", "lateral", "slabs", "vehicles")
 _PREDICTED = np.array([at.U_PREDICTED, at.V_PREDICTED], dtype=np.int32)
 _ITERATE = np.array([at.U, at.V], dtype=np.int32)
-_ROWS = [at.STEP, at.WHEEL_RECORD]

@@ -125,25 +125,10 @@ class SplineArrays:
         for i, dof in enumerate(self.cars.car):
             view[:, i, : len(dof)] = values[:, dof]
 
-    def squares(self) -> Floats:
-        """Sums of the squares of rows U, V, A over all coordinates, those of trains that fill a chunk included."""
-        rails = self.rail.reshape(-1, at.RAIL_ROWS * self.lanes)[:, : 3 * 5 * self.lanes]
-        slabs = self.slab.reshape(-1, at.SLAB_ROWS * 8)[:, : 3 * 8]
-        cars = self.car.reshape(-1, at.CAR_ROWS * self.cars.blocks * 8)[:, : 3 * self.cars.blocks * 8]
-        return sum((_squares(part) for part in (rails, slabs, cars)), np.zeros(3))
-
-    def bed_motion(self, k: float, c: float) -> Floats:
-        """Stiffness k times u plus damping c times v of all slabs, shape (B, groups, N, 8)."""
-        N, K = self.slab_dofs, self.half_width
-        groups = len(self.slab_design) // self._whole
-        whole = self.slab.reshape(self._whole, groups, N + 2 * K, at.SLAB_ROWS, 8)[: self.trains, :, K : K + N]
-        return k * whole[..., at.U, :] + c * whole[..., at.V, :]
-
     @property
-    def designs(self) -> NDArray[np.int64]:
-        """Design of the slab in each slot, shape (8 groups,); the last slots may hold none."""
-        first: Floats = self.slab_design.reshape(self._whole, -1)[0]
-        return first.astype(np.int64)
+    def groups(self) -> int:
+        """Groups of eight slots of a train."""
+        return len(self.slab_design) // self._whole
 
     def _car_view(self, row: int) -> Floats:
         """A row of the cars as (train, car, coordinate)."""
@@ -192,10 +177,3 @@ class SplineArrays:
     @property
     def _padded(self) -> int:
         return self.functions + 2 * at.REACH
-
-
-def _squares(rows: Floats) -> Floats:
-    """Sums of the squares of three rows side by side, shape (m, 3 k), each: shape (3,)."""
-    three = rows.reshape(len(rows), 3, -1)
-    found: Floats = np.einsum("mrk,mrk->r", three, three)
-    return found

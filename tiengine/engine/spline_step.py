@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.spline_arrays import SplineArrays
 from tiengine.engine.spline_tables import RailTables, SeatTables, SlabTables, Spans
 from tiengine.engine.vector_mode import VectorLaunch
@@ -89,7 +90,7 @@ class SplineStep:
     Attributes:
         state: What is advanced, in place.
         job: First step, number of steps, stages (``spline_layout``) of the next launch.
-        record: Rows of the wheels' and of the bodies' record that each step fills, -1 for none, shape (steps, 2).
+        record: Row of the bodies' record that each step fills, -1 for none, shape (steps,).
         launch: The bound kernel; ``launch.vector_mode`` tells how it was compiled.
     """
 
@@ -109,7 +110,9 @@ class SplineStep:
         irregularity: Floats,
         wheel_record: Floats,
         body_record: Floats,
+        slab_record: Floats,
         bed: Bed,
+        loads: LoadRows,
     ):
         """Bind.
 
@@ -126,9 +129,12 @@ class SplineStep:
             contact: Arrays of the contact.
             clock: Window at the end of each step, shape (steps, N_CLOCK).
             irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
-            wheel_record: Wheel output, shape (B, rows, W, 2, N_WHEEL).
+            wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
+            slab_record: Displacement, velocity, acceleration of every slab coordinate where the bodies are recorded,
+                vectors, shape (B rows groups N 3, 8).
             bed: Bed, read if MORTAR_MODE is not 0.
+            loads: Loads of the cars.
         """
         cars = state.cars
         size = np.zeros(at.N_SIZE, dtype=np.int32)
@@ -136,16 +142,18 @@ class SplineStep:
         size[at.SEATS], size[at.SLAB_DOFS], size[at.PASSES] = len(seats.place), state.slab_dofs, passes
         size[at.GROUPS] = -(-int(dims[layout.SLOTS]) // 8)
         size[at.CARS], size[at.CAR_DOFS], size[at.ELEMENTS] = len(cars.car), cars.dofs, len(suspension.kind)
+        size[at.LOAD_STEP], size[at.LOAD_TRAIN] = loads.step // 8, loads.train // 8
+        car_load = loads.array.reshape(-1, 8)
         self.state, self.size = state, size
         self.job = np.array([0, 1, at.ALL_STAGES], dtype=np.int32)
-        self.record = np.full((len(clock), 2), -1, dtype=np.int32)
+        self.record = np.full(len(clock), -1, dtype=np.int32)
         arrays = (
             self.job, self.record, size, dims, constants, clock,
             state.rail, rails.coefficient,
             state.seat, seats.point, spans.span, seats.place, seats.shape,
-            state.slab, state.slab_seat, state.slab_design, slabs.coefficient, slabs.seat_index,
-            slabs.seat_shape, slabs.seat_x,
-            state.car, cars.columns, cars.load, cars.columns_start, cars.vehicle_place, cars.wheelset_place,
+            state.slab, state.slab_seat, state.slab_design, slab_record, slabs.coefficient,
+            slabs.seat_index, slabs.seat_shape, slabs.seat_x,
+            state.car, cars.columns, car_load, cars.columns_start, cars.vehicle_place, cars.wheelset_place,
             cars.element_place,
             suspension.row, suspension.kind, suspension.linear, suspension.table,
             state.under, rails.wheel_place, rails.wheel_shape, rails.wheel_rows, contact.wheel, contact.table,
@@ -154,8 +162,8 @@ class SplineStep:
             body_record, bed.index, bed.shape, bed.weight, bed.factor, bed.rest, bed.lateral_K, bed.lateral_C,
             bed.numbers, np.zeros((3, slabs.dofs)), bed.pressure,
         )  # fmt: skip
-        vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, state.car,
-                   cars.columns, cars.load)  # fmt: skip
+        vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, slab_record,
+                   state.car, cars.columns, car_load)  # fmt: skip
         self.launch = VectorLaunch(
             step_kernel,
             (state.lanes, slabs.half_width, cars.blocks),

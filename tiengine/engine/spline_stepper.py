@@ -6,14 +6,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from tiengine.engine.aligned import aligned_zeros
+from tiengine.engine.bed_pressure import fill_pressures
 from tiengine.engine.chunk import Chunk
+from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.spline_state import SplineState
 from tiengine.engine.spline_step import SplineStep, Suspension
-from tiengine.engine.stepper import Stage, Stepper
+from tiengine.engine.stepper import Plan, Rows, Stage, Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.spline_model import SplineModel
+from tiengine.parameters.arrays import Flags
 
 __all__ = ["SplineStepper"]
+
+Window = tuple[int, int]
+"""Rear seat and slab."""
 
 REFACTOR = 1e-3
 """Relative change of speed at which the tables that depend on it are made again; in between the convective terms of
@@ -41,92 +48,111 @@ class SplineStepper(Stepper):
         """
         super().__init__(model.ingredients, state, chunk)
         self.model, train, tables = model, model.ingredients.train, state.tables
+        rows = chunk.body.shape[1] * state.held.groups * state.held.slab_dofs * 3
+        self._slab_record = aligned_zeros((state.trains * rows, 8))
+        cars = tables.cars
+        width = 8 * cars.blocks * len(cars.car)
+        self.loads = LoadRows(model.ingredients, model.vehicle_load, cars.load_place, width, 8, len(chunk.clock))
         self.launch = SplineStep(
             state.held, model.dims, model.constants, model.ingredients.passes, tables.rails, tables.spans,
             tables.seats, tables.slabs,
             Suspension(train.element_row, train.element_kind, train.element_linear, train.element_table),
-            state.wheels, chunk.clock, chunk.irregularity, chunk.wheel, chunk.body, state.bed,
+            state.wheels, chunk.clock, chunk.irregularity, chunk.wheel, chunk.body,
+            self._slab_record, state.bed, self.loads,
         )  # fmt: skip
         self._compiled = self.launch.launch.compile_seconds
         self.factored_speed = float("nan")
         self._window = (-1, -1)
-        self._pending = 0
+        self._first = 0
         self._explicit_bed = int(model.dims[at.MORTAR_MODE]) > 0
-        rows, dofs = chunk.body.shape[1], state.tables.slabs.dofs
-        groups = -(-state.slots // 8)
-        self._bed = np.zeros((state.trains, rows, groups, dofs, 8))
-        self._design = np.zeros((rows, state.slots), dtype=np.int64)
         self.bind()
 
-    @property
-    def seat_extremes_due(self) -> bool:
-        """Whether the seats move on before the next step, or the chunk ends: the launch keeps extremes until then."""
-        coming = self.rows.step + 1
-        return coming >= len(self.moves) or self._changes(coming) != (False, False)
+    def seat_extremes_due(self, plan: Plan) -> Flags:
+        """Steps after which the seats move on, and the last of a chunk: launches keep the extremes until then."""
+        due = np.ones(len(self.moves) + 1, dtype=np.bool_)
+        window, factored = self._window, self.factored_speed
+        for i in np.flatnonzero(self.moves).tolist():
+            if i >= plan.step[0]:
+                due[i], window, factored = self._changes(i, window, factored)
+        due[:-1] &= self.moves
+        return due[plan.step + 1]
+
+    def take(self, plan: Plan) -> None:
+        """Take the planned steps, each launch up to the next one after which something reads the state."""
+        due = [each(plan) for each in self.due]
+        pressures = (plan.body >= 0) & self._explicit_bed
+        reads = np.logical_or.reduce([pressures, self.seat_extremes_due(plan), *due])
+        reads[-1:] = True
+        self._will_record(plan)
+        first = 0
+        for last in np.flatnonzero(reads).tolist():
+            self._first, self.rows = int(plan.step[first]), Rows(*(int(values[last]) for values in plan))
+            self.call((*self.stages, *(w for w, each in zip(self.watchers, due, strict=True) if each[last])))
+            first = last + 1
+
+    def _will_record(self, plan: Plan) -> None:
+        """Set the rows of the record that steps fill, and the rear slab then."""
+        self.launch.record[plan.step] = plan.body
+        taken = plan.body >= 0
+        self.chunk.rear_slab[plan.body[taken]] = self.chunk.clock[plan.step[taken], at.FIRST_SLAB]
+
+    def step(self, i: int, wheel_row: int = -1, body_row: int = -1) -> None:
+        """Take one step."""
+        self._first = i
+        self._will_record(Plan(*(np.array([row]) for row in (i, wheel_row, body_row))))
+        super().step(i, wheel_row, body_row)
 
     def _stages(self) -> Iterator[Stage]:
         """Stages of the step in their order; :mod:`tiengine.kernels.spline_step` gives the equations."""
         yield "window and seats", self._enter
         yield "step", self._advance
-        yield "recording", self._record_bed
+        if self._explicit_bed:
+            yield "recording", self._record_pressure
 
     def _enter(self) -> None:
         """Let seats and slabs in and out where they change; factorise again when the speed has changed enough."""
-        window, speed = self._changes(self.rows.step)
-        clock = self.chunk.clock[self.rows.step]
-        if window:
-            self._window = int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])
-            self.state.enter(*self._window)
-        if speed:
-            self.factor(float(clock[at.SPEED]))
+        if not self.moves[self._first]:
+            return
+        _, window, V = self._changes(self._first, self._window, self.factored_speed)
+        if window != self._window:
+            self._window = window
+            self.state.enter(*window)
+        if V != self.factored_speed:
+            self.factor(V)
 
-    def _changes(self, i: int) -> tuple[bool, bool]:
-        """Whether seats or slabs move on, and whether tables are to be made for another speed, before step ``i``."""
-        if not self.moves[i]:
-            return False, False
-        clock, factored = self.chunk.clock[i], self.factored_speed
-        V = float(clock[at.SPEED])
-        window = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])) != self._window
-        return window, V != factored and not abs(V - factored) < REFACTOR * factored
+    def _changes(self, i: int, window: Window, factored: float) -> tuple[bool, Window, float]:
+        """Whether anything changes before step ``i``, its rear seat and slab, the speed that its tables are made for.
+
+        Args:
+            i: Row of the chunk.
+            window: Rear seat and slab before it.
+            factored: Speed that the tables were made for before it [m/s].
+        """
+        clock = self.chunk.clock[i]
+        moved, V = (int(clock[at.FIRST_SEAT]), int(clock[at.FIRST_SLAB])), float(clock[at.SPEED])
+        if abs(V - factored) < REFACTOR * factored:
+            V = factored
+        return moved != window or V != factored, moved, V
 
     def _advance(self) -> None:
-        """Take this step, with those put off before it, unless nothing reads the state after it."""
-        i, wheel_row, body_row = self.rows
-        self.launch.record[i] = wheel_row, body_row
-        self._pending += 1
-        if body_row >= 0 or self.watched or self.seat_extremes_due:
-            self.launch(i + 1 - self._pending, self._pending)
-            self._pending = 0
+        """Take the steps of a launch."""
+        self.launch(self._first, self.rows.step + 1 - self._first)
 
-    def _record_bed(self) -> None:
-        """Keep the bed's motion, or its pressures, if this step records the bodies."""
-        row = self.rows.body
-        if row < 0:
-            return
-        state = self.state
-        if self._explicit_bed:
-            self.chunk.mortar[:, row] = state.bed.pressure
-            return
-        self._bed[:, row] = state.held.bed_motion(*self.model.bed_numbers[:2])
-        self._design[row] = state.held.designs[: state.slots]
+    def _record_pressure(self) -> None:
+        """Keep the pressures of an explicit bed if this step records the bodies."""
+        if self.rows.body >= 0:
+            self.chunk.mortar[:, self.rows.body] = self.state.bed.pressure
 
     def finish(self, body_rows: int) -> None:
-        """Extreme pressures of a wholly implicit bed, where the bodies were recorded.
-
-        At rest they are those of the slab's weight; k u + c v adds to them. One product for a whole chunk of steps.
-        """
-        m, rows = self.model, body_rows
-        if rows == 0 or self._explicit_bed:  # then they are known from the forces
-            return
-        kinds = self._design[:rows].ravel()
-        factor, at_rest = (values.reshape(len(values), -1)[kinds] for values in (m.bed_factor, m.bed_rest))
-        for bed, out in zip(self._bed[:, :rows], self.chunk.mortar[:, :rows], strict=True):
-            by_slot = bed.transpose(0, 1, 3, 2).reshape(rows, -1, bed.shape[2])[:, : self.state.slots]
-            pressure = by_slot.reshape(len(kinds), -1) @ m.bed_points
-            pressure *= factor
-            pressure += at_rest
-            out[..., 0] = pressure.max(axis=1).reshape(out.shape[:2])
-            out[..., 1] = pressure.min(axis=1).reshape(out.shape[:2])
+        """Put the record of the slabs into the chunk; pressures of a wholly implicit bed."""
+        self.chunk.filled = body_rows
+        held, slots = self.state.held, self.state.slots
+        shape = (held.trains, -1, held.groups, held.slab_dofs, 3, 8)
+        recorded = self._slab_record.reshape(shape)[:, :body_rows].transpose(0, 1, 4, 2, 5, 3)
+        by_slot = recorded.reshape(held.trains, body_rows, 3, 8 * held.groups, held.slab_dofs)
+        self.chunk.slab[:, :body_rows] = by_slot[..., :slots, :]
+        if not self._explicit_bed:  # else they are known from the forces
+            fill_pressures(self.model, self.chunk)
 
     def compile(self) -> float:
         """Wall time of compiling the kernel [s]; it was compiled when it was bound."""

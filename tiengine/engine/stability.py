@@ -107,6 +107,7 @@ def step_growth(model: Model, V: float, steps: float, lanes: int | None = None) 
         lanes: See :func:`tiengine.engine.kinds.state_at_rest`; by default those of one train.
     """
     lanes = lanes or lanes_for(1)
+    model = replace(model, ingredients=replace(model.ingredients, given=()))  # given loads do not depend on the motion
     count = int(np.clip(SHARE * steps, SHORTEST, LONGEST))
     slab = model.ingredients.designs.matrices[0]
     plates = sp.csr_array(slab.M), sp.csr_array(slab.K_plate + slab.K_bed)
@@ -121,7 +122,7 @@ def step_growth(model: Model, V: float, steps: float, lanes: int | None = None) 
 def _growth(model: Model, V: float, count: int, lanes: int, matrices: dict[str, MassAndStiffness]) -> Growth:
     """Growth in a trial of one train lifted off, or of two that roll."""
     g = model.ingredients
-    state, chunk = state_at_rest(model, lanes), Chunk.empty(g, count, 1, 1)
+    state, chunk = state_at_rest(model, lanes), Chunk.empty(g, count, 1)
     stepper = make_stepper(model, state, chunk)
     advance = max(V * g.newmark.dt, g.slab.fastening_pitch / count)  # a slow train also meets all places of the seats
     X = advance * np.arange(1.0, count + 1.0)

@@ -8,20 +8,21 @@ same for all.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from tiengine.engine.chunk import Chunk
+from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.state import State
 from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
 from tiengine.model.ingredients import Ingredients
-from tiengine.parameters.arrays import Reals
+from tiengine.parameters.arrays import Flags, Ints, Reals
+from tiengine.vehicle.given_loads import GivenLoads
 
-__all__ = ["BETWEEN_STEPS", "Rows", "Stage", "Stepper"]
+__all__ = ["BETWEEN_STEPS", "Due", "Plan", "Rows", "Stage", "Stepper", "always"]
 
 Call = Callable[[], object]
 Stage = tuple[str, Call]
@@ -35,14 +36,35 @@ class Rows(NamedTuple):
     """Rows that a step fills.
 
     Attributes:
-        step: Row of the chunk.
-        wheel: Row of the wheels' record, -1 none.
+        step: Row of the chunk, also of the wheels' record: every step records the wheels.
+        wheel: Number of the wheels' sample in the file's chunk, -1 if the step is none.
         body: Row of the bodies' record, -1 none.
     """
 
     step: int
     wheel: int = -1
     body: int = -1
+
+
+class Plan(NamedTuple):
+    """Rows of successive steps, each an array of shape (steps,); see :class:`Rows`."""
+
+    step: Ints
+    wheel: Ints
+    body: Ints
+
+    def part(self, first: int, end: int) -> Plan:
+        """Steps from place ``first`` to before place ``end``."""
+        return Plan(*(values[first:end] for values in self))
+
+
+Due = Callable[[Plan], Flags]
+"""Whether a watcher reads the state after each of the planned steps, shape (steps,)."""
+
+
+def always(plan: Plan) -> Flags:
+    """Each of the steps."""
+    return np.ones(len(plan.step), dtype=np.bool_)
 
 
 class Stepper(ABC):
@@ -56,10 +78,12 @@ class Stepper(ABC):
         moves: Whether seats, slabs or speed change at each loaded step, shape (steps,).
         stages: Own stages of one step, in their order.
         watchers: Stages after them, see :meth:`watch`.
+        loads: Loads of the cars in the kernels' layout.
         factored_speed: Speed for which the matrices that depend on it were made [m/s].
     """
 
     factored_speed: float
+    loads: LoadRows
 
     def __init__(self, ingredients: Ingredients, state: State, chunk: Chunk) -> None:
         """Keep the data of every kind of step; a derived class calls :meth:`bind` once its stages can be made."""
@@ -68,14 +92,16 @@ class Stepper(ABC):
         self.moves = np.zeros(0, dtype=np.bool_)
         self.stages: tuple[Stage, ...] = ()
         self.watchers: list[Stage] = []
-        self._due: list[Callable[[], bool]] = []
-        self._calls: tuple[Call, ...] = ()
+        self.due: list[Due] = []
         self._mark: Callable[[str], object] | None = None
 
-    @property
-    def seat_extremes_due(self) -> bool:
-        """Whether the extremes of the seats' forces must be taken from the state after this step; by default always."""
-        return True
+    def seat_extremes_due(self, plan: Plan) -> Flags:
+        """Steps after which the extremes of the seats' forces must be taken from the state; by default all of them.
+
+        Args:
+            plan: Successive steps, at the first of which the stepper stands.
+        """
+        return always(plan)
 
     @abstractmethod
     def _stages(self) -> Iterator[Stage]:
@@ -104,27 +130,20 @@ class Stepper(ABC):
     def bind(self) -> None:
         """Make the stages."""
         self.stages = tuple(self._stages())
-        self._bind_calls()
 
-    def watch(self, name: str, call: Call, before: str | None = None, due: Callable[[], bool] = lambda: True) -> None:
-        """Call something at the end of every step.
+    def watch(self, name: str, call: Call, before: str | None = None, due: Due = always) -> None:
+        """Call something at the end of steps.
 
         Args:
             name: Name of this stage.
             call: Reads :attr:`state`, :attr:`chunk` and :attr:`rows`.
             before: Name of the watcher that it precedes; None: it is the last.
-            due: Called within a step: whether ``call`` will read the state after it. A step may put off its work until
-                one is due.
+            due: Steps of a plan after which ``call`` reads; :meth:`take` calls it after these only.
         """
         names = [each for each, _ in self.watchers]
-        self.watchers.insert(len(names) if before is None else names.index(before), (name, call))
-        self._due.append(due)
-        self._bind_calls()
-
-    @property
-    def watched(self) -> bool:
-        """Whether anything reads the state after this step; without watchers a caller may."""
-        return not self._due or any(due() for due in self._due)
+        place = len(names) if before is None else names.index(before)
+        self.watchers.insert(place, (name, call))
+        self.due.insert(place, due)
 
     def time_stages(self, mark: Callable[[str], object] | None) -> None:
         """Let a clock be read within the coming steps, or no longer.
@@ -134,9 +153,8 @@ class Stepper(ABC):
                 neighbours of the same name; None to end it. Such a reading costs about 0.1 us.
         """
         self._mark = mark
-        self._bind_calls()
 
-    def load(self, X: Reals, V: Reals, V_rate: Reals, irregularity: Reals) -> None:
+    def load(self, X: Reals, V: Reals, V_rate: Reals, irregularity: Reals, given: GivenLoads | None = None) -> None:
         """Fill the chunk for the coming steps.
 
         Args:
@@ -144,10 +162,13 @@ class Stepper(ABC):
             V: Speed [m/s].
             V_rate: Its rate [m/s^2].
             irregularity: Track channels, shape (B, steps, W, N_IRREGULARITY).
+            given: Loads of the train beyond gravity; None where it has none.
         """
         clock = window_clock(self.ingredients.slab, X, V, V_rate, self.ingredients.seat_reach)
         self.chunk.clock[: len(X)] = clock
         self.chunk.irregularity[:, : len(X)] = irregularity
+        if given is not None:
+            self.loads.fill(given, len(X))
         changes = np.diff(clock[:, [at.FIRST_SEAT, at.FIRST_SLAB, at.SPEED]], axis=0).any(axis=1)
         self.moves = np.concatenate([[True], changes])
 
@@ -160,18 +181,25 @@ class Stepper(ABC):
             body_row: Row of the bodies' record to fill, -1 none.
         """
         self.rows = Rows(i, wheel_row, body_row)
-        for call in self._calls:
-            call()
+        self.call((*self.stages, *self.watchers))
 
-    def _bind_calls(self) -> None:
-        """Make the calls of a step: its stages, with readings of the clock between them if they are timed."""
-        stages, mark = (*self.stages, *self.watchers), self._mark
+    def take(self, plan: Plan) -> None:
+        """Take the planned steps one after another.
+
+        A kind of step that can take several at once overrides this: between two of them nothing may read the state.
+        """
+        for rows in zip(*(values.tolist() for values in plan), strict=True):
+            self.step(*rows)
+
+    def call(self, stages: Sequence[Stage]) -> None:
+        """Call stages in their order, with readings of the clock between those of other names if they are timed."""
+        mark = self._mark
         if mark is None:
-            self._calls = tuple(call for _, call in stages)
+            for _, call in stages:
+                call()
             return
-        calls: list[Call] = [partial(mark, BETWEEN_STEPS)]
+        mark(BETWEEN_STEPS)
         for i, (name, call) in enumerate(stages):
-            calls.append(call)
+            call()
             if i + 1 == len(stages) or stages[i + 1][0] != name:
-                calls.append(partial(mark, name))
-        self._calls = tuple(calls)
+                mark(name)

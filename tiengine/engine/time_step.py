@@ -65,7 +65,7 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
             reason = str(error)
             continue
         if jit == 0.0:
-            chunk = Chunk.empty(parts, 1, 1, 1)
+            chunk = Chunk.empty(parts, 1, 1)
             jit = make_stepper(model, state_at_rest(model, lanes), chunk, public=public_launch).compile()
         reason = _instability(scenario, model, lanes)
         if not reason:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from tiengine.result import Result
 
-__all__ = ["draw"]
+__all__ = ["draw", "draw_bands", "stretch_extremes", "stretches"]
 
 STRETCH = 2.0  # m, length of a stretch
 MOST_STRETCHES = 300  # longer runs have longer stretches
@@ -52,25 +53,52 @@ def draw(result: Result, train: int | None = None) -> Figure:
     several = len(trains[0].scenario.parts.vehicles) > 1
     lead = float(runs[0].group["wheelset_offset"][0])
     begin, end = (pick(run.chainage_range[i] for run in runs) + lead for i, pick in ((0, min), (1, max)))
-    bins = int(np.clip(np.ceil((end - begin) / STRETCH), 1, MOST_STRETCHES))
-    extremes = np.stack([_extremes(run, begin, end, bins, several=several) for run in runs])
-    x: Reals = begin + (end - begin) / bins * (np.arange(bins, dtype=np.float64) + 0.5)
+    bins = stretches(begin, end)
+    extremes = np.stack([stretch_extremes(run, begin, end, bins, several=several) for run in runs])
     whose = "all wheelsets" if several else "leading wheelset"
-    stretches = f"{len(complete)} trains, stretches of {(end - begin) / bins:.3g} m"
-    figure = new_figure(15.0, f"{result.name.rpartition('/')[2]}: {whose} of {stretches}")
+    return draw_bands(extremes, begin, end, complete, f"{result.name.rpartition('/')[2]}: {whose}")
+
+
+def stretches(begin: float, end: float) -> int:
+    """Number of stretches between two chainages [m]."""
+    return int(np.clip(np.ceil((end - begin) / STRETCH), 1, MOST_STRETCHES))
+
+
+@in_style
+def draw_bands(extremes: Reals, begin: float, end: float, trains: Sequence[int], title: str) -> Figure:
+    """Draw the extremes of many trains.
+
+    Args:
+        extremes: Largest Q, smallest Q, largest |Y| [kN] of every train, shape (trains, 3, bins).
+        begin: Chainage of the first stretch [m].
+        end: Chainage of the end of the last one [m].
+        trains: Numbers of the trains.
+        title: Small text above the figure.
+    """
+    bins = extremes.shape[2]
+    x: Reals = begin + (end - begin) / bins * (np.arange(bins, dtype=np.float64) + 0.5)
+    figure = new_figure(15.0, f"{title} of {len(trains)} trains, stretches of {(end - begin) / bins:.3g} m")
     axes = figure.subplots(3, 1, sharex=True)
     titles = ("Largest Q in the stretch", "Smallest Q in the stretch", "Largest |Y| in the stretch")
-    for i, (panel, title) in enumerate(zip(axes, titles, strict=True)):
-        farthest = complete[_plot(panel, x, extremes[:, i])]
-        panel.set(title=f"{title}; farthest from the median: train {farthest}", ylabel="[kN]")
+    for i, (panel, heading) in enumerate(zip(axes, titles, strict=True)):
+        farthest = trains[_plot(panel, x, extremes[:, i])]
+        panel.set(title=f"{heading}; farthest from the median: train {farthest}", ylabel="[kN]")
         panel.margins(x=0.0)
     axes[2].set_xlabel("chainage of the wheelset [m]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
-def _extremes(run: Samples, begin: float, end: float, bins: int, *, several: bool) -> Reals:
-    """Largest Q, smallest Q and largest |Y| [kN], shape (3, bins); NaN in stretches that the train did not reach."""
+def stretch_extremes(run: Samples, begin: float, end: float, bins: int, *, several: bool) -> Reals:
+    """Largest Q, smallest Q and largest |Y| [kN], shape (3, bins); NaN in stretches that the train did not reach.
+
+    Args:
+        run: Vertical and lateral forces of the wheels of one train.
+        begin: Chainage of the first stretch [m].
+        end: Chainage of the end of the last one [m].
+        bins: Number of stretches.
+        several: Whether all wheelsets count, not the leading one alone.
+    """
     offsets = run.group["wheelset_offset"][:]
     Q, Y = Band(begin, end, bins), Band(begin, end, bins)
     for position, channels in run.slices():

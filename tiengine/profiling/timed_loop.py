@@ -6,11 +6,9 @@ Blocks of steps without stage timers and with them take turns, so that the cost 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
 from dataclasses import dataclass, field
-from itertools import islice
 
-from tiengine.engine.stepper import BETWEEN_STEPS, Stepper
+from tiengine.engine.stepper import BETWEEN_STEPS, Plan, Stepper
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.result_files.writer import Writer
 from tiengine.simulation.time_loop import CHUNK_STEPS, LoopTimer, Run
@@ -96,20 +94,20 @@ class StageTimer(LoopTimer):
             self.times.chunks[name] = self.times.chunks.get(name, 0) + now - self._last
         self._last = now
 
-    def take(self, stepper: Stepper, rows: Iterable[tuple[int, int, int]]) -> None:
+    def take(self, stepper: Stepper, plan: Plan) -> None:
         """Take the steps of a chunk, blocks without and with stage timers in turn."""
-        left = iter(rows)
-        while plain := list(islice(left, self.block)):
+        for first in range(0, len(plan.step), 2 * self.block):
+            plain, timed = (plan.part(at, at + self.block) for at in (first, first + self.block))
             start = time.perf_counter_ns()
             plain_steps(stepper, plain)
             without = time.perf_counter_ns() - start
             self.times.plain_ns += without
-            self.times.plain_steps += len(plain)
-            if timed := list(islice(left, self.block)):
+            self.times.plain_steps += len(plain.step)
+            if len(timed.step):
                 spent = self.take_timed(stepper, timed)
-                self.times.blocks.append((spent / len(timed), without / len(plain)))
+                self.times.blocks.append((spent / len(timed.step), without / len(plain.step)))
 
-    def take_timed(self, stepper: Stepper, rows: list[tuple[int, int, int]]) -> int:
+    def take_timed(self, stepper: Stepper, plan: Plan) -> int:
         """Take steps with stage timers.
 
         Returns:
@@ -119,12 +117,12 @@ class StageTimer(LoopTimer):
         clock, append = time.perf_counter_ns, self._marks.append
         stepper.time_stages(lambda name: append((name, clock())))
         start = clock()
-        plain_steps(stepper, rows)
+        plain_steps(stepper, plan)
         end = clock()
         stepper.time_stages(None)
         self._add_marks(start, end)
         self.times.timed_ns += end - start
-        self.times.timed_steps += len(rows)
+        self.times.timed_steps += len(plan.step)
         return end - start
 
     def _add_marks(self, start: int, end: int) -> None:

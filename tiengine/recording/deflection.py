@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tiengine.engine.state import DISPLACEMENT
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.stepper import Plan, Stepper
 from tiengine.kernels import layout as at
-from tiengine.parameters.arrays import Reals
+from tiengine.parameters.arrays import Flags, Ints, Reals
 from tiengine.result_files.layout import Block
 from tiengine.track.plate_shapes import W, element_dofs, locate, tabulate_shapes
 from tiengine.track.slab import Slab
@@ -33,7 +33,7 @@ class Deflection:
     Attributes:
         stepper: Is watched.
         every: Steps from one snapshot to the next.
-        steps: Steps so far.
+        steps: Steps before the present chunk.
     """
 
     stepper: Stepper
@@ -59,19 +59,19 @@ class Deflection:
         """Name of its stage of the step."""
         return "deflection"
 
-    def due(self) -> bool:
-        """Whether a snapshot is taken after the present step, which is not yet counted."""
-        return (self.steps + 1) % self.every == 0
+    def due(self, plan: Plan) -> Flags:
+        """Steps after which a snapshot is taken."""
+        return self._taken_after(plan.step)
 
     def watch(self) -> None:
         """Take a snapshot if it is time for one."""
-        self.steps += 1
-        if self.steps % self.every == 0:
+        if self._taken_after(np.array(self.stepper.rows.step)):
             self._snapshots.append((self.stepper.rows.step, np.stack([self._rail(), self._slab()])))
 
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
         """Snapshots of the chunk whose steps end at the given times [s], with the train at the given chainages [m]."""
         taken, self._snapshots = self._snapshots, []
+        self.steps += len(time)
         steps = np.array([step for step, _ in taken], dtype=np.int64)
         trains = self.stepper.state.trains
         none = np.empty((2, 0, trains, 2, len(self._points)))
@@ -89,6 +89,11 @@ class Deflection:
     def restore(self, saved: Mapping[str, Reals]) -> None:
         """Continue from the values of :meth:`saved`."""
         self.steps = int(saved["steps"])
+
+    def _taken_after(self, step: Ints) -> Flags:
+        """Whether a snapshot follows rows of the chunk."""
+        taken: Flags = (self.steps + step + 1) % self.every == 0
+        return taken
 
     def _slab(self) -> Reals:
         """Deflection of the slabs under the rails [m], shape (B, 2, points); NaN where there is none."""

@@ -17,9 +17,9 @@ from typing import Protocol
 import numpy as np
 
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.stepper import Plan, Stepper
 from tiengine.model.ingredients import Ingredients
-from tiengine.parameters.arrays import Reals
+from tiengine.parameters.arrays import Flags, Reals
 from tiengine.parameters.conventions import SIDES
 from tiengine.recording.seat_envelopes import watched_seats
 from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION
@@ -159,12 +159,12 @@ class GaugeSamples:
         """Name of its stage of the step."""
         return "gauges"
 
-    def due(self) -> bool:
-        """Whether the present step records the wheels."""
-        return self.stepper.rows.wheel >= 0
+    def due(self, plan: Plan) -> Flags:
+        """Steps that sample the wheels."""
+        return plan.wheel >= 0
 
     def watch(self) -> None:
-        """Read, if the step records the wheels."""
+        """Read, if the step samples the wheels."""
         step, row, _ = self.stepper.rows
         if row < 0:
             return

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
 from tiengine.engine.state import PARTS
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.stepper import Plan, Stepper
 from tiengine.kernels import layout as at
+from tiengine.parameters.arrays import Flags
 from tiengine.parameters.conventions import SIDES
-from tiengine.recording.step_oscillation import StepOscillation
+from tiengine.recording.step_oscillation import WINDOW, StepOscillation
 from tiengine.result_files.channels import DOFS
 from tiengine.result_files.events import EVENT_KINDS, Event
 from tiengine.scenario.event_policy import Events
@@ -34,6 +35,9 @@ LIMITS = (10.0, 1e3, 1e7)
 
 STEEPEST = 0.98
 """A flange climbs where its slope falls below this part of the steepest; the straight flank varies by 1 %."""
+
+FORCES = [at.VERTICAL_FORCE, at.LATERAL_FORCE]
+"""Columns of the wheels' record that are looked at for an oscillation."""
 
 QUIET = 1.0
 """A wheel's event is not reported again within this time [s]."""
@@ -110,7 +114,6 @@ class Guard:
         self.every = max(int(EVERY / self._dt + 1e-9), 1)
         self._look_every = StepOscillation.interval(self._dt)
         self._shift, self._normal = self.state.relative_shift, self.state.normal_force
-        self._vertical_lateral = self.state.forces_on_rails[..., :2]
         self._static_load = float(static_wheel_loads(self._train).max())
         table = ingredients.contact
         self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
@@ -129,19 +132,18 @@ class Guard:
     def watch_step(self) -> None:
         """Check at the end of a step if it is time to, and after the last of a chunk."""
         i = self.stepper.rows.step
-        step = self._done + i + 1
-        if self.watch.oscillation.sample(step, self._look_every, self._vertical_lateral):
-            self._oscillates(step, step * self._dt, float(self._position[i]))
-        if self._check_due(i):
-            self.check(step, float(self._position[i]))
+        step, position = self._done + i + 1, float(self._position[i])
+        if (i + 1) % self._look_every == 0:
+            self._oscillates(i, step * self._dt, position)
+        if step % self.every == 0 or i + 1 == len(self._position):
+            self.check(step, position)
 
-    def due(self) -> bool:
-        """Whether the present step is checked, or its forces are looked at."""
-        i = self.stepper.rows.step
-        return self._check_due(i) or self.watch.oscillation.due(self._done + i + 1, self._look_every)
-
-    def _check_due(self, i: int) -> bool:
-        return (self._done + i + 1) % self.every == 0 or i + 1 == len(self._position)
+    def due(self, plan: Plan) -> Flags:
+        """Steps after which the state is checked, or the forces of the last ones are looked at."""
+        checked = (self._done + plan.step + 1) % self.every == 0
+        looked = (plan.step + 1) % self._look_every == 0
+        due: Flags = checked | looked | (plan.step + 1 == len(self._position))
+        return due
 
     def check(self, step: int, position: float) -> None:
         """Check the state after a step.
@@ -179,16 +181,17 @@ class Guard:
         words = f"derailed: lateral shift beyond {self._derailed * 1e3:.1f} mm on the flange side"
         self._report_wheels(0, self._shift > self._derailed, step, time, position, words)
 
-    def _oscillates(self, step: int, time: float, position: float) -> None:
-        """Report wheels whose forces alternate from step to step."""
-        found, size = self.watch.oscillation.look(self._look_every * self._dt, self._static_load)
+    def _oscillates(self, i: int, time: float, position: float) -> None:
+        """Report wheels whose forces alternate from step to step, up to row ``i`` of the chunk."""
+        samples = self.stepper.chunk.wheel[:, i + 1 - WINDOW : i + 1, ..., FORCES]
+        found, size = self.watch.oscillation.look(samples, self._look_every * self._dt, self._static_load)
         if not found.any():
             return
         words = (
             f"forces alternate from step to step by {1e-3 * size[found].max():.2g} kN: the step is unstable; try"
             f" numerics.time_step = {0.5 * self._dt:g} or more passes"
         )
-        self._report_wheels(3, found, step, time, position, words)
+        self._report_wheels(3, found, self._done + i + 1, time, position, words)
 
     def take(self) -> dict[int, list[Event]]:
         """Events since the last call, by place of the train."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.engine.chunk import Chunk
+from tiengine.engine.stepper import Plan
 from tiengine.kernels import layout as at
 from tiengine.result_files.channels import MORTAR
 from tiengine.result_files.layout import DTYPES, Block, GroupSpec, TrainLabels
@@ -44,7 +45,7 @@ class Samples:
     """Records of one train in a chunk of steps.
 
     Attributes:
-        wheel: Output of the wheels, see ``layout``, shape (rows, W, 2, N_WHEEL).
+        wheel: Output of the wheels in every step, see ``layout``, shape (steps, W, 2, N_WHEEL).
         body: Displacement, velocity, acceleration of the bodies, shape (rows, 3, 5 bodies).
         slab: Index of the slab in each slot, recorded with the bodies, shape (rows, slots).
         pressure: Largest and smallest mortar pressure of each slab [Pa], shape (rows, slots, 2).
@@ -78,21 +79,16 @@ class Recorder:
         """Steps between two samples of the bodies."""
         return self._steps(self.scenario.output.body_interval)
 
-    def rows(self, done: int, count: int) -> Iterator[tuple[int, int, int]]:
-        """Steps of a chunk, with the rows of the wheels' and the bodies' records that each fills (-1 none).
+    def plan(self, done: int, count: int) -> Plan:
+        """Steps of a chunk, with the samples of the wheels and the rows of the bodies' record (-1 none).
 
         Args:
             done: Steps before the chunk.
             count: Steps of the chunk.
         """
-        wheel_row = body_row = 0
-        wheel_every, body_every = self.wheel_every, self.body_every
-        for i in range(count):
-            k = done + i + 1
-            wheels, bodies = k % wheel_every == 0, k % body_every == 0
-            yield i, wheel_row if wheels else -1, body_row if bodies else -1
-            wheel_row += wheels
-            body_row += bodies
+        number = np.arange(done + 1, done + count + 1)
+        samples = (number % every == 0 for every in (self.wheel_every, self.body_every))
+        return Plan(np.arange(count), *(np.where(taken, np.cumsum(taken) - 1, -1) for taken in samples))
 
     def body_rows(self, done: int, count: int) -> int:
         """Rows of the bodies' record that ``count`` steps after ``done`` fill."""
@@ -145,17 +141,17 @@ class Recorder:
         at_bodies = np.arange(first, first + len(position)) % self.body_every == 0
         pressure = chunk.mortar[:, : int(at_bodies.sum())]
         held = _slabs_held(chunk.clock[: len(position)][at_bodies, at.FIRST_SLAB], pressure.shape[2])
-        return [self._block(Samples(chunk.wheel[b], chunk.body[b], held, pressure[b]), times) for b in rows]
+        return [self._block(Samples(chunk.wheel[b], chunk.body[b], held, pressure[b]), times, first) for b in rows]
 
     def block(self, samples: Samples, steps: NDArray[np.int64], position: NDArray[np.float64]) -> dict[str, Block]:
         """Blocks of one train.
 
         Args:
-            samples: Records of those steps that are recorded; rows beyond them are ignored.
-            steps: Numbers of the steps, counted from 1, shape (steps,).
+            samples: Records of the steps; rows beyond them are ignored.
+            steps: Numbers of the steps, counted from 1 and successive, shape (steps,).
             position: Chainage of the first vehicle's centre at each step [m], shape (steps,).
         """
-        return self._block(samples, self._times(steps, position))
+        return self._block(samples, self._times(steps, position), int(steps[0]))
 
     def _times(self, steps: NDArray[np.int64], position: NDArray[np.float64]) -> tuple[Times, Times]:
         """Times [s] and chainages [m] of the wheels' samples and of the bodies'."""
@@ -163,11 +159,12 @@ class Recorder:
         time = steps * self.dt
         return (time[at_wheels], position[at_wheels]), (time[at_bodies], position[at_bodies])
 
-    def _block(self, samples: Samples, times: tuple[Times, Times]) -> dict[str, Block]:
-        """The groups of one train, in the precision of the file."""
+    def _block(self, samples: Samples, times: tuple[Times, Times], first: int) -> dict[str, Block]:
+        """The groups of one train, in the precision of the file; ``first`` is the number of the first step."""
         out, (at_wheels, at_bodies) = self.scenario.output, times
         wheels, bodies = len(at_wheels[0]), len(at_bodies[0])
-        wheel, body = samples.wheel[:wheels], samples.body[:bodies]
+        every, body = self.wheel_every, samples.body[:bodies]
+        wheel = samples.wheel[-first % every :: every][:wheels]
         irregularity = {name: wheel[..., IRREGULARITY_COLUMNS[name]] for name in out.irregularity_channels}
         forces = {name: wheel[..., WHEEL_COLUMNS[name]] for name in out.wheel_channels}
         shape = (bodies, body.shape[-1] // 5, 5)  # a short last chunk may hold no sample of the bodies

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.stepper import Plan, Stepper
 from tiengine.model.ingredients import Ingredients
-from tiengine.parameters.arrays import Reals
+from tiengine.parameters.arrays import Flags, Reals
 from tiengine.result_files.layout import Block
 
 __all__ = ["SeatEnvelopes", "watched_seats"]
@@ -60,14 +60,12 @@ class SeatEnvelopes:
         """Name of its stage of the step."""
         return "envelopes"
 
-    def due(self) -> bool:
-        """Whether the seats' extremes are taken after the present step."""
-        return self.stepper.seat_extremes_due
+    def due(self, plan: Plan) -> Flags:
+        """Steps after which the seats' extremes are taken."""
+        return self.stepper.seat_extremes_due(plan)
 
     def watch(self) -> None:
         """Take in the forces of the steps since the last time."""
-        if not self.due():
-            return
         state = self.stepper.state
         if state.first_seat != self.first_seat:
             self._move(state.first_seat)

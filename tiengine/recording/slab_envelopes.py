@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.engine.state import DISPLACEMENT
 from tiengine.engine.stepper import Stepper
 from tiengine.model.implicit_seats import seat_shapes
 from tiengine.model.ingredients import Ingredients
@@ -18,6 +17,9 @@ from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
 
 __all__ = ["SlabEnvelopes", "SlotExtremes"]
+
+ROWS = 25
+"""Samples of a product: its result stays in the cache while it is searched."""
 
 
 @dataclass(eq=False)
@@ -54,15 +56,16 @@ class SlotExtremes:
             largest[:], smallest[:] = -np.inf, np.inf
         self.first_slab = first_slab
 
-    def add(self, largest: NDArray[np.float64], smallest: NDArray[np.float64]) -> None:
+    def add(self, largest: Reals, smallest: Reals, trains: slice = slice(None)) -> None:
         """Take in new values.
 
         Args:
             largest: Largest values of the slabs in all slots since the last call, shape (B, slots, points).
             smallest: Smallest values.
+            trains: Those of these trains.
         """
-        np.maximum(self.largest, largest, out=self.largest)
-        np.minimum(self.smallest, smallest, out=self.smallest)
+        np.maximum(self.largest[trains], largest, out=self.largest[trains])
+        np.minimum(self.smallest[trains], smallest, out=self.smallest[trains])
 
     def take(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Slabs put aside since the last call: their indices (n,), largest and smallest (B, n, quantities)."""
@@ -93,9 +96,9 @@ class SlabEnvelopes:
     Attributes:
         stepper: Is watched.
         void: Smallest factor of the voids under each slab that has one.
-        moments: Reads the moments.
+        moments: Bending moments by the motion.
         shape: Deflection at the nodes and under the seats, moments at the places of :mod:`tiengine.track.slab_moments`.
-        pressure: Of the mortar; it lags behind, as pressures come at the end of a chunk.
+        pressure: Of the mortar.
     """
 
     stepper: Stepper
@@ -105,10 +108,8 @@ class SlabEnvelopes:
     pressure: SlotExtremes
 
     def __post_init__(self) -> None:
-        """Buffers of a sample."""
+        """Operator on the slabs' coordinates."""
         self._places = _deflections(self.stepper.ingredients)
-        self._values = np.empty(self.shape.largest.shape)
-        self._first: list[int] = []
 
     @classmethod
     def of(cls, scenario: Scenario, stepper: Stepper) -> SlabEnvelopes:
@@ -116,43 +117,34 @@ class SlabEnvelopes:
         void: dict[int, float] = {}
         for each in scenario.track.mortar_voids:
             void[each.slab] = min(each.factor, void.get(each.slab, each.factor))
-        moments, nodes = SlabMoments(stepper), _deflections(stepper.ingredients).shape[1]
+        moments, nodes = SlabMoments(stepper.ingredients), _deflections(stepper.ingredients).shape[1]
         trains, slots = stepper.state.trains, stepper.state.slots
         starts = (0, nodes, nodes + moments.points)
         shape = SlotExtremes.of(trains, slots, nodes + 2 * moments.points, starts)
         return cls(stepper, void, moments, shape, SlotExtremes.of(trains, slots, 1))
 
-    @property
-    def stage(self) -> str:
-        """Name of its stage of the step."""
-        return "envelopes"
-
-    def due(self) -> bool:
-        """Whether the present step records the bodies."""
-        return self.stepper.rows.body >= 0
-
-    def watch(self) -> None:
-        """Take in the slabs' shape if the step records the bodies."""
-        if not self.due():
-            return
-        state = self.stepper.state
-        first, motion = state.first_slab, state.slab_motion(DISPLACEMENT)
-        self.shape.move(first)
-        nodes = self._places.shape[1]
-        self._values[..., :nodes] = motion @ self._places
-        self.moments.read(self._values[..., nodes:])
-        self.shape.add(self._values, self._values)
-        self._first.append(first)
-
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
-        """Slabs that were left behind, train by train; neither times nor positions matter."""
-        first, mortar = np.array(self._first, dtype=np.int64), self.stepper.chunk.mortar
-        self._first.clear()
-        for slab in np.unique(first):
-            rows = slice(*np.searchsorted(first, (slab, slab + 1)))  # the window never goes back
-            self.pressure.move(int(slab))
-            self.pressure.add(mortar[:, rows, :, :1].max(axis=1), mortar[:, rows, :, 1:].min(axis=1))
+        """Take in the bodies' samples of the chunk; slabs that were left behind, train by train.
+
+        Neither times nor positions matter.
+        """
+        chunk = self.stepper.chunk
+        rear = chunk.rear_slab[: chunk.filled]
+        for slab in np.unique(rear):
+            rows = slice(*np.searchsorted(rear, (slab, slab + 1)).tolist())  # the window never goes back
+            self._take_in(int(slab), chunk.slab[:, rows], chunk.mortar[:, rows])
         return self._taken()
+
+    def _take_in(self, rear: int, moved: Reals, pressure: Reals) -> None:
+        """Take in samples with one rear slab: motion (B, rows, 3, slots, dofs), pressures (B, rows, slots, 2)."""
+        self.pressure.move(rear)
+        self.pressure.add(pressure[..., :1].max(axis=1), pressure[..., 1:].min(axis=1))
+        self.shape.move(rear)
+        for b, motion in enumerate(moved):
+            for first in range(0, len(motion), ROWS):
+                part = motion[first : first + ROWS]
+                values = np.concatenate([part[:, 0] @ self._places, self.moments.of(rear, part)], axis=2)
+                self.shape.add(values.max(axis=0), values.min(axis=0), slice(b, b + 1))
 
     def remainder(self) -> list[Block]:
         """Slabs still in memory."""

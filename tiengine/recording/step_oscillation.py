@@ -45,12 +45,10 @@ class StepOscillation:
     """Looks at vertical and lateral wheel forces; B trains, W wheelsets. Its arrays are part of a checkpoint.
 
     Attributes:
-        samples: Vertical and lateral force at the last steps [N], shape (WINDOW, B, W, 2, 2).
         lasted: How long each wheel's force has alternated, less how long it has not [s], shape (B, W, 2).
         began: Amplitude when it began [N], same shape.
     """
 
-    samples: Reals
     lasted: Reals
     began: Reals
 
@@ -58,36 +56,18 @@ class StepOscillation:
     def none(cls, trains: int, wheelsets: int) -> StepOscillation:
         """Nothing oscillates yet."""
         wheels = (trains, wheelsets, 2)
-        return cls(np.zeros((WINDOW, *wheels, 2)), np.zeros(wheels), np.zeros(wheels))
+        return cls(np.zeros(wheels), np.zeros(wheels))
 
     @staticmethod
     def interval(dt: float) -> int:
         """Steps of dt [s] from one look to the next."""
         return max(round(EVERY / dt), WINDOW)
 
-    @staticmethod
-    def due(step: int, interval: int) -> bool:
-        """Whether a step, numbered from 1, belongs to a window."""
-        return (step - 1) % interval < WINDOW
-
-    def sample(self, step: int, interval: int, force: Reals) -> bool:
-        """Keep the forces if a step belongs to a window; whether it is the last of one.
+    def look(self, samples: Reals, interval: float, static_load: float) -> tuple[NDArray[np.bool_], Reals]:
+        """Judge the last steps.
 
         Args:
-            step: Its number, from 1.
-            interval: See :meth:`interval`.
-            force: Vertical and lateral forces of the wheels [N], shape (B, W, 2, 2).
-        """
-        if not self.due(step, interval):
-            return False
-        place = (step - 1) % interval
-        self.samples[place] = force
-        return place == WINDOW - 1
-
-    def look(self, interval: float, static_load: float) -> tuple[NDArray[np.bool_], Reals]:
-        """Judge the window that has just been filled.
-
-        Args:
+            samples: Vertical and lateral force of the wheels [N], shape (B, WINDOW, W, 2, 2).
             interval: Time since the last one [s].
             static_load: Of a wheel [N].
 
@@ -95,11 +75,11 @@ class StepOscillation:
             Wheels whose force oscillates, shape (B, W, 2), and the amplitude [N] of each.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            first = np.diff(self.samples, axis=0)
-            second = np.diff(first, axis=0)
-            squares = np.einsum("t...,t...->...", second, second)
-            alternates = squares / len(second) > ALTERNATING * np.einsum("t...,t...->...", first, first) / len(first)
-            sizes = np.where(alternates, 0.25 * np.sqrt(squares / len(second)), 0.0)  # +A, -A, +A differ by 4 A
+            first = np.diff(samples, axis=1)
+            second = np.diff(first, axis=1)
+            squares = np.mean(second * second, axis=1)
+            alternates = squares > ALTERNATING * np.mean(first * first, axis=1)
+            sizes = np.where(alternates, 0.25 * np.sqrt(squares), 0.0)  # +A, -A, +A differ by 4 A
         size = sizes.max(axis=-1)
         going = size > LEAST * static_load
         fresh = going & (self.lasted == 0.0)

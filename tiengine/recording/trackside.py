@@ -1,20 +1,20 @@
 """Records of the track: envelopes of seats and slabs, gauges, snapshots of the deflection.
 
-Watchers read the state at the end of every step. With each chunk of steps they hand over what is complete, so that
-memory does not grow with distance; what they keep are plain arrays, which :meth:`Trackside.saved` returns and
-:meth:`Trackside.restore` takes.
+Watchers read the state at the end of steps; the extremes of slabs come from the chunk's record. With each chunk of
+steps they hand over what is complete, so that memory does not grow with distance; what they keep are plain arrays,
+which :meth:`Trackside.saved` returns and :meth:`Trackside.restore` takes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from tiengine.engine.stepper import Stepper
-from tiengine.parameters.arrays import Reals
+from tiengine.engine.stepper import Plan, Stepper
+from tiengine.parameters.arrays import Flags, Reals
 from tiengine.recording.deflection import Deflection
 from tiengine.recording.gauge_samples import gauge_samples
 from tiengine.recording.seat_envelopes import SeatEnvelopes
@@ -28,18 +28,8 @@ from tiengine.track.slab import Slab
 __all__ = ["Trackside", "Watcher", "trackside_groups"]
 
 
-class Watcher(Protocol):
-    """Reads the state at every step and fills a group of the file."""
-
-    @property
-    def stage(self) -> str:
-        """Name of its stage of the step."""
-
-    def watch(self) -> None:
-        """Read the state at the end of a step."""
-
-    def due(self) -> bool:
-        """Whether :meth:`watch` will read the state after the present step."""
+class Record(Protocol):
+    """Fills a group of the file."""
 
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
         """Hand over what is complete, train by train.
@@ -59,18 +49,33 @@ class Watcher(Protocol):
         """Continue from the values of :meth:`saved`."""
 
 
+@runtime_checkable
+class Watcher(Record, Protocol):
+    """Reads the state at the end of steps and fills a group of the file."""
+
+    @property
+    def stage(self) -> str:
+        """Name of its stage of the step."""
+
+    def watch(self) -> None:
+        """Read the state at the end of a step."""
+
+    def due(self, plan: Plan) -> Flags:
+        """Steps of a plan after which :meth:`watch` reads the state, shape (steps,)."""
+
+
 @dataclass(eq=False)
 class Trackside:
-    """The watchers of a run.
+    """The records of a run's track.
 
     Attributes:
-        watchers: Watchers by the group that they fill.
+        records: By the group that they fill.
         point_offset: Points of the group ``deflection`` forward of the first vehicle's centre [m].
         trains: Trains advanced together, B.
         dtype: Precision of the file.
     """
 
-    watchers: dict[str, Watcher]
+    records: dict[str, Record]
     point_offset: Reals
     trains: int
     dtype: Any
@@ -83,12 +88,13 @@ class Trackside:
             scenario: Selects the groups that are recorded.
             stepper: Is watched.
         """
-        watchers = dict(_watchers(scenario, stepper))
-        for watcher in watchers.values():
-            stepper.watch(watcher.stage, watcher.watch, due=watcher.due)
-        snapshots = watchers.get("deflection")
+        records = dict(_records(scenario, stepper))
+        for record in records.values():
+            if isinstance(record, Watcher):
+                stepper.watch(record.stage, record.watch, due=record.due)
+        snapshots = records.get("deflection")
         offset = snapshots.point_offset if isinstance(snapshots, Deflection) else np.zeros(0)
-        return cls(watchers, offset, stepper.state.trains, DTYPES[scenario.output.precision])
+        return cls(records, offset, stepper.state.trains, DTYPES[scenario.output.precision])
 
     def blocks(self, time: Reals, position: Reals, failed: Container[int] = ()) -> list[dict[str, Block]]:
         """Blocks to be written after a chunk of steps, train by train; the arrays are copies.
@@ -100,8 +106,8 @@ class Trackside:
                 are left out.
         """
         found: list[dict[str, Block]] = [{} for _ in range(self.trains)]
-        for group, watcher in self.watchers.items():
-            for b, block in enumerate(watcher.blocks(time, position)):
+        for group, record in self.records.items():
+            for b, block in enumerate(record.blocks(time, position)):
                 if group not in ENVELOPES or b not in failed:
                     found[b][group] = self._cast(block)
         return found
@@ -109,20 +115,20 @@ class Trackside:
     def remainder(self) -> list[dict[str, Block]]:
         """Blocks to be written at the end of the run, train by train."""
         found: list[dict[str, Block]] = [{} for _ in range(self.trains)]
-        for group, watcher in self.watchers.items():
-            for b, block in enumerate(watcher.remainder()):
+        for group, record in self.records.items():
+            for b, block in enumerate(record.remainder()):
                 found[b][group] = self._cast(block)
         return found
 
     def saved(self) -> dict[str, Reals]:
         """Arrays that the coming steps depend on, between two chunks."""
-        return {f"{group}.{key}": value for group, each in self.watchers.items() for key, value in each.saved().items()}
+        return {f"{group}.{key}": value for group, each in self.records.items() for key, value in each.saved().items()}
 
     def restore(self, saved: Mapping[str, Reals]) -> None:
         """Continue from the values of :meth:`saved`, in a run of the same scenario."""
-        for group, watcher in self.watchers.items():
+        for group, record in self.records.items():
             own = f"{group}."
-            watcher.restore({key.removeprefix(own): value for key, value in saved.items() if key.startswith(own)})
+            record.restore({key.removeprefix(own): value for key, value in saved.items() if key.startswith(own)})
 
     def _cast(self, block: Block) -> Block:
         channels = {name: np.array(value, self.dtype) for name, value in block.channels.items()}
@@ -133,7 +139,7 @@ ENVELOPES = {"seats": SEATS, "slabs": SLABS}
 
 
 def trackside_groups(scenario: Scenario) -> dict[str, GroupSpec]:
-    """Groups of the file that a scenario records of the track, in the order of the watchers."""
+    """Groups of the file that a scenario records of the track, in the order of the records."""
     out = scenario.output
     groups: dict[str, GroupSpec] = {}
     if out.envelopes:
@@ -155,8 +161,8 @@ def _gauge_group(gauge: Gauge, slab: Slab) -> GroupSpec:
     return GroupSpec.gauge("motion", {"on": gauge.on, "chainage": gauge.chainage, **where})
 
 
-def _watchers(scenario: Scenario, stepper: Stepper) -> Iterator[tuple[str, Watcher]]:
-    """Watchers by the group that they fill."""
+def _records(scenario: Scenario, stepper: Stepper) -> Iterator[tuple[str, Record]]:
+    """Records by the group that they fill."""
     out = scenario.output
     if out.envelopes:
         yield "seats", SeatEnvelopes.of(stepper)

@@ -32,7 +32,7 @@ from tiengine.vehicle.vehicle import Vehicle, vehicle_from_table
 if TYPE_CHECKING:
     from tiengine.scenario.tables import Track, Train
 
-__all__ = ["Parts", "build_parts", "collect_presets"]
+__all__ = ["Parts", "build_parts", "collect_presets", "used_presets"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +105,23 @@ def collect_presets(train: Train, track: Track, presets: Presets, folder: Path |
                 tables[name] = _read(where, kind, name, folder, stated)
             stated = {**tables[name], **stated}
             name = tables[name].get("like")
+    return found
+
+
+def used_presets(train: Train, track: Track, presets: Presets) -> Presets:
+    """Presets that a scenario refers to, out of those of many scenarios.
+
+    Args:
+        train: The train's table.
+        track: The track's table.
+        presets: Result of :func:`collect_presets`, of this scenario and of others.
+    """
+    found: Presets = {}
+    for _, kind, part in _references(train, track):
+        name = part if isinstance(part, str) else part.get("like")
+        while name in presets.get(kind, {}) and name not in found.setdefault(kind, {}):
+            found[kind][name] = presets[kind][name]
+            name = presets[kind][name].get("like")
     return found
 
 

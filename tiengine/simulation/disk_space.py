@@ -15,7 +15,7 @@ from tiengine.result_files.channels import DIRECTIONS, DOFS
 from tiengine.result_files.layout import CHUNK
 from tiengine.scenario.scenario import Scenario, duration
 
-__all__ = ["check_space", "estimated_bytes"]
+__all__ = ["check_space", "estimated_bytes", "size_text"]
 
 USUAL_STEP = 2e-4
 """Time step [s] assumed for "auto", which tries longer ones first."""
@@ -52,8 +52,9 @@ def check_space(scenario: Scenario, path: Path) -> None:
     needed, free = estimated_bytes(scenario), shutil.disk_usage(path.parent).free
     if needed > free:
         raise InputError(
-            f"output = '{path}': needs about {_size(needed)}, {_size(free)} are free: {_size(needed - free)} are"
-            " missing; record fewer channels, longer output intervals, or write to another disk"
+            f"output = '{path}': needs about {size_text(needed)}, {size_text(free)} are free:"
+            f" {size_text(needed - free)} are missing; record fewer channels, longer output intervals, or write to"
+            " another disk"
         )
 
 
@@ -116,5 +117,10 @@ def _interval(stated: float | str, dt: float) -> float:
     return dt if isinstance(stated, str) else max(round(stated / dt), 1) * dt
 
 
-def _size(count: int) -> str:
+def size_text(count: int) -> str:
+    """Size in MB or GB.
+
+    Args:
+        count: Bytes.
+    """
     return f"{count / 1e9:.2f} GB" if count >= 1e9 else f"{count / 1e6:.1f} MB"

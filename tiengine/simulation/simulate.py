@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +32,11 @@ from tiengine.simulation.disk_space import check_space
 from tiengine.simulation.messages import Message
 from tiengine.simulation.stream import never_stop, run_task
 from tiengine.simulation.tasks import Task, plan
-from tiengine.simulation.worker import distribute
+from tiengine.simulation.worker import distribute, send_task
 
 IMPORT_SECONDS = time.perf_counter() - IMPORT_BEGAN
 
-__all__ = ["AUTO_STEPS", "CHECKPOINT_SECONDS", "Progress", "prepare", "resume", "run"]
+__all__ = ["AUTO_STEPS", "CHECKPOINT_SECONDS", "Progress", "cores", "prepare", "resume", "run"]
 
 CHECKPOINT_SECONDS = 60.0
 """Wall time between two checkpoints [s]; one takes about 30 ms."""
@@ -205,8 +206,7 @@ class _Job:
                 tasks,
                 workers,
                 collector.latest,
-                public=self.public,
-                every=self.checkpoint,
+                run=partial(send_task, public=self.public, every=self.checkpoint),
                 stop=self.stop,
                 notify=collector.notify,
             )
@@ -227,5 +227,9 @@ def _workers(scenario: Scenario) -> int:
     """Processes: one per core, divided by the threads of each; splines use one thread."""
     numerics = scenario.numerics
     threads = numerics.threads if numerics.trial_functions == "sines" else 1
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(cores // threads, 1)
+    return max(cores() // threads, 1)
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

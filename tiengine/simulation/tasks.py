@@ -18,7 +18,7 @@ from tiengine.irregularity.track_function import TrackFunction, recorded_name
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario, to_toml
 
-__all__ = ["TRAINS_TOGETHER", "Task", "plan"]
+__all__ = ["TRAINS_TOGETHER", "Task", "likeness", "plan"]
 
 TRAINS_TOGETHER = 16
 """Most trains advanced together."""
@@ -65,7 +65,7 @@ def plan(
     members = scenario.members
     groups: dict[str, list[int]] = {}
     for i, train in enumerate(members):
-        groups.setdefault(_shared(train), []).append(i)
+        groups.setdefault(likeness(train), []).append(i)
     tasks: list[Task] = []
     for group in groups.values():
         tasks += _tasks(members, functions, group, together, len(tasks))
@@ -102,8 +102,12 @@ def _tasks(
     return tasks
 
 
-def _shared(train: Scenario) -> str:
-    """Text that is the same for trains of one group: the irregularity's shortest wave matters to the time step."""
+def likeness(train: Scenario) -> str:
+    """Text that is the same for trains of one group: the irregularity's shortest wave matters to the time step.
+
+    Args:
+        train: Scenario of one train.
+    """
     shortest = shortest_wavelength(train.irregularity)
     others = train.model_copy(update={"irregularity": IrregularityParams(), "presets": {}})
     return f"{shortest!r}\n{to_toml(others)}"

@@ -6,7 +6,7 @@ Between two chunks of steps a checkpoint can be made (:mod:`tiengine.simulation.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from typing import Any
@@ -18,7 +18,7 @@ from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium, release
 from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.state import State
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.stepper import Plan, Stepper
 from tiengine.engine.time_step import prepare
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.irregularity.track_checks import check_reach
@@ -35,8 +35,6 @@ __all__ = ["CHUNK_STEPS", "LoopTimer", "Run"]
 
 CHUNK_STEPS = 1000
 
-Rows = tuple[int, int, int]
-
 
 class LoopTimer:
     """Hooks of the loop for a profiler; these measure nothing."""
@@ -48,15 +46,14 @@ class LoopTimer:
             name: The part; None begins the first.
         """
 
-    def take(self, stepper: Stepper, rows: Iterable[Rows]) -> None:
+    def take(self, stepper: Stepper, plan: Plan) -> None:
         """Take the steps of a chunk.
 
         Args:
             stepper: Is loaded.
-            rows: Row of the chunk, of the wheels' and of the bodies' record of each step (-1 none).
+            plan: The steps.
         """
-        for row in rows:
-            stepper.step(*row)
+        stepper.take(plan)
 
 
 @dataclass(eq=False)
@@ -123,8 +120,7 @@ class Run:
         scenario, ingredients = task.scenario, model.ingredients
         recorder = Recorder(scenario, ingredients.newmark.dt)
         state = state_at_rest(model) if at_rest else _started(scenario, model)
-        rows = (CHUNK_STEPS // every + 1 for every in (recorder.wheel_every, recorder.body_every))
-        chunk = Chunk.empty(ingredients, CHUNK_STEPS, *rows)
+        chunk = Chunk.empty(ingredients, CHUNK_STEPS, CHUNK_STEPS // recorder.body_every + 1)
         parallel = scenario.numerics.threads > 1 and task.size > 1
         stepper = make_stepper(model, state, chunk, parallel=parallel, public=public)
         jit = stepper.compile()
@@ -174,7 +170,7 @@ class Run:
         x = self._load(most)
         done, count, recorder = self.done, len(x), self.recorder
         with np.errstate(over="ignore", invalid="ignore"):  # until the guard checks
-            self.timer.take(self.stepper, recorder.rows(done, count))
+            self.timer.take(self.stepper, recorder.plan(done, count))
             self.timer.lap(None)
             self.stepper.finish(recorder.body_rows(done, count))
         self.timer.lap("mortar")
@@ -192,7 +188,9 @@ class Run:
         wheels = x[:, None] + ingredients.train.wheelset_x
         irregularity = np.stack([track.sample(wheels) for track in self.tracks])
         self.timer.lap("irregularity")
-        self.stepper.load(x - ingredients.centre_s, V, V_rate, irregularity)
+        time = ingredients.newmark.dt * np.arange(self.done + 1.0, self.done + count + 1.0)
+        given = ingredients.given_loads(time, x, V, V_rate)
+        self.stepper.load(x - ingredients.centre_s, V, V_rate, irregularity, given)
         self.guard.load(self.done, x)
         self.position = float(x[-1])
         self.timer.lap("window and seats")

@@ -10,28 +10,26 @@ turns off.
 
 from __future__ import annotations
 
-import math
 import multiprocessing
 import os
 import signal
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from threadpoolctl import threadpool_limits
 
 if TYPE_CHECKING:
     from tiengine.result_files.checkpoint import Checkpoint
-    from tiengine.simulation.messages import Message
     from tiengine.simulation.tasks import Task
 
-__all__ = ["distribute"]
+__all__ = ["Runner", "Work", "distribute", "send_task"]
 
 PATIENCE = 10.0  # s for a worker to exit by itself: it writes Taichi's cache
 
@@ -50,30 +48,70 @@ RESTARTS = 1
 """Number of times that the trains of a dead worker are started again, from their checkpoint if there is one."""
 
 
-def work(pipe: Connection, public: bool, every: float) -> None:
+class Work(Protocol):
+    """Task as this module sees it.
+
+    Attributes:
+        number: Number of the task.
+        trains: Numbers of its trains.
+    """
+
+    @property
+    def number(self) -> int: ...  # noqa: D102
+
+    @property
+    def trains(self) -> tuple[int, ...]: ...  # noqa: D102
+
+
+Runner = Callable[[Any, "Checkpoint | None", Callable[[], bool], Callable[[Any], None]], None]
+"""Function that does a task in a worker: task, its checkpoint, ``stop``, and where to send messages."""
+
+
+def work(pipe: Connection, run: Runner) -> None:
     """Main function of a worker process; it ends when None is received or the parent is gone.
 
     Args:
         pipe: Connection to the parent.
-        public: Public Taichi calls only.
-        every: Wall time between two checkpoints [s].
+        run: Does a task.
     """
     for number in SIGNALS:  # the parent itself sends its workers STOP
         signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
-    from tiengine.simulation.stream import run_task
-
     try:
         with threadpool_limits(1):
             pipe.send(IDLE)
             while (received := pipe.recv()) not in (None, STOP):
                 task, saved = received
-                for message in run_task(task, public=public, saved=saved, every=every, stop=pipe.poll):
-                    pipe.send(message)
+                run(task, saved, pipe.poll, pipe.send)
                 pipe.send(IDLE)
     except (EOFError, ConnectionError):  # the parent is gone
         return
+
+
+def send_task(
+    task: Task,
+    saved: Checkpoint | None,
+    stop: Callable[[], bool],
+    send: Callable[[Any], None],
+    *,
+    public: bool,
+    every: float,
+) -> None:
+    """Send the messages of a task of trains.
+
+    Args:
+        task: The trains.
+        saved: Checkpoint to continue from; None starts at t = 0.
+        stop: Called after every chunk of steps; if true, the trains are saved and left.
+        send: Called with every message.
+        public: Launch kernels by public Taichi calls only.
+        every: Wall time between two checkpoints [s].
+    """
+    from tiengine.simulation.stream import run_task
+
+    for message in run_task(task, public=public, saved=saved, every=every, stop=stop):
+        send(message)
 
 
 def _exit_with_parent() -> None:
@@ -89,29 +127,27 @@ class _Worker:
     """A worker as its parent sees it."""
 
     process: SpawnProcess
-    task: Task | None = None
+    task: Work | None = None
     ready: bool = False
     stopping: bool = False
 
 
 def distribute(
-    tasks: Sequence[Task],
+    tasks: Sequence[Work],
     workers: int,
     latest: Mapping[int, Checkpoint],
     *,
-    public: bool = False,
-    every: float = math.inf,
+    run: Runner,
     stop: Callable[[], bool] = lambda: False,
     notify: Callable[[str], None] = lambda words: None,
-) -> Iterator[Message]:
+) -> Generator[Any, None, None]:
     """Run tasks in worker processes.
 
     Args:
         tasks: Tasks; each goes to the first worker that is free.
         workers: Processes.
         latest: Last checkpoint of each task by its number, kept by the receiver of the messages.
-        public: Public Taichi calls only.
-        every: Wall time between two checkpoints [s].
+        run: Does a task in a worker; must be picklable without importing Taichi.
         stop: Called several times a second; if true, all trains are saved and the workers exit.
         notify: Called with a sentence for each worker that dies and whose trains are started again.
 
@@ -132,7 +168,7 @@ def distribute(
         while waiting or active:
             busy = sum(worker.task is not None for worker in active.values())
             while len(active) < min(workers, busy + len(waiting)):
-                _start_worker(active, public, every)
+                _start_worker(active, run)
             if stop():
                 waiting.clear()
                 _send_stop(active)
@@ -169,11 +205,11 @@ def distribute(
         _wait_for_exit([*active.values(), *leaving])
 
 
-def _start_worker(active: dict[Connection, _Worker], public: bool, every: float) -> None:
+def _start_worker(active: dict[Connection, _Worker], run: Runner) -> None:
     """Start a worker."""
     spawn = multiprocessing.get_context("spawn")
     ours, theirs = spawn.Pipe()
-    process = spawn.Process(target=work, args=(theirs, public, every), daemon=True, name=f"tiengine-{len(active)}")
+    process = spawn.Process(target=work, args=(theirs, run), daemon=True, name=f"tiengine-{len(active)}")
     with _signals_ignored():
         process.start()
     theirs.close()  # so that its death ends the pipe
@@ -194,7 +230,7 @@ def _signals_ignored() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _assign(pipe: Connection, task: Task | None, latest: Mapping[int, Checkpoint]) -> None:
+def _assign(pipe: Connection, task: Work | None, latest: Mapping[int, Checkpoint]) -> None:
     """Send a task with its checkpoint, or None to end the worker; one that has died shows at its pipe."""
     with suppress(OSError):
         pipe.send(None if task is None else (task, latest.get(task.number)))

@@ -18,8 +18,9 @@ the step's mesh is one of the loads,
 
     K u = S F - M a - int N^T p
 
-The loads of a step balance but for its tolerance; the rest is taken off as the inertia of a rigid motion. All of it is
-linear: a table from the inputs to the moments at fixed places.
+The loads balance but for rounding; the rest is taken off as the inertia of a rigid motion. All of it is linear: a table
+from the inputs to the moments at fixed places. The forces of the seats themselves follow from the motion of the step's
+mesh, M a + C v + K u = S F, so that one operator takes (u, v, a) to the moments.
 
 Under a load on a point the moment of a thin plate grows without bound (like a logarithm): with fastenings that have no
 baseplate the moment below them is that of an element of the fine mesh and means nothing.
@@ -37,17 +38,12 @@ from tiengine.track.baseplate import POINT, seat_rows
 from tiengine.track.mortar import GAUSS, Mortar
 from tiengine.track.plate_shapes import WX, WXX, WY, WYY, W, element_dofs, locate, shapes_at, tabulate_shapes
 from tiengine.track.slab import Slab
+from tiengine.track.slab_matrices import SlabMatrices
 
 __all__ = [
-    "GAUSS_POINTS",
-    "MomentTable",
-    "fine_mesh",
-    "moment_rows",
-    "moment_table",
-    "nodes",
-    "places",
-    "plate_matrices",
-]
+    "GAUSS_POINTS", "MomentTable", "fine_mesh", "moment_rows", "moment_table", "moments_of_motion",
+    "moments_of_pressure", "nodes", "places", "plate_matrices", "pressures_felt",
+]  # fmt: skip
 
 GAUSS_POINTS = np.array([[x, y] for x in (-1.0, 1.0) for y in (-1.0, 1.0)]) / np.sqrt(3.0)
 """Local coordinates of an element's points, shape (4, 2): second derivatives are closest to the exact ones there."""
@@ -100,7 +96,7 @@ class MomentTable:
 
     Attributes:
         places: x and y from the slab's centre [m]: at the seats and midway between them along the track; under the
-            rails, on the centre line and midway between these across it; shape (2, points).
+            rails and on the centre line across it; shape (2, points).
         matrix: From the inputs to M_x, then M_y, shape (inputs, 2 points). Inputs are the seats' forces (F_V left and
             right, M_b left and right, each of all seats), accelerations of the slab's n coordinates, then their rates
             on a bed, or the bed's pressure at its quadrature points [Pa].
@@ -124,7 +120,7 @@ def moment_table(
     """
     fine = fine or fine_mesh(slab)
     K, M, B = plate_matrices(fine)
-    along, across = np.arange(1 - slab.fastenings, slab.fastenings) / 2.0, np.linspace(-1.0, 1.0, 5)
+    along, across = np.arange(1 - slab.fastenings, slab.fastenings) / 2.0, np.array([-1.0, 0.0, 1.0])
     grid = np.meshgrid(slab.fastening_pitch * along, slab.seat_half_spacing * across, indexing="ij")
     where = np.stack([part.ravel() for part in grid])
     moments = moment_rows(fine, *where).T.toarray()
@@ -137,6 +133,78 @@ def moment_table(
         loads.append(-_pressure_loads(slab, fine))
         answer = _of_free_plate(fine, K, M, moments)
     return MomentTable(where, sp.csr_array(sp.hstack(loads)).T @ answer)
+
+
+def moments_of_motion(
+    slab: Slab, mortar: Mortar, design: SlabMatrices, sound: MomentTable, by_pressure: MomentTable | None
+) -> Reals:
+    """Operator from a slab's displacements, rates and accelerations to M_x, then M_y, shape (3, n, 2 points).
+
+    Args:
+        slab: The slab with the step's mesh.
+        mortar: Its bed, taken as linear.
+        design: Its matrices.
+        sound: Table of the slab on a bed without voids.
+        by_pressure: Table of the slab under given pressures, for a design with voids.
+    """
+    n, forces = design.n, 4 * slab.fastenings
+    from_loads = _seat_forces_of_loads(design)
+    balance = np.stack([design.K_plate + design.K_bed, design.C_bed, design.M])
+    balance[:, -2:] = 0.0  # the lateral motion has no part in it
+    table = sound if by_pressure is None else by_pressure
+    operator: Reals = balance @ from_loads @ table.matrix[:forces]
+    operator[2] += table.matrix[forces : forces + n]
+    if by_pressure is None:
+        operator[1] += table.matrix[forces + n :]
+        return operator
+    felt = pressures_felt(design) @ table.matrix[forces + n :]
+    operator[0] += mortar.stiffness * felt
+    operator[1] += mortar.damping * felt
+    return operator
+
+
+def moments_of_pressure(slab: Slab, design: SlabMatrices, by_pressure: MomentTable) -> Reals:
+    """Operator from pressures of the bed beyond the linear ones to M_x, then M_y, shape (points, 2 places).
+
+    At a given motion the seats press by as much more as the bed does.
+
+    Args:
+        slab: The slab with the step's mesh.
+        design: Its matrices.
+        by_pressure: Table of the slab under given pressures.
+    """
+    points = design.bed_factor.size
+    loads = np.zeros((len(design.bed_index), len(design.bed_weight), design.n))
+    for e, index in enumerate(design.bed_index):
+        loads[e][:, index] = design.bed_weight[:, None] * design.bed_shape
+    forces = loads.reshape(points, design.n) @ _seat_forces_of_loads(design)
+    operator: Reals = by_pressure.matrix[-points:] + forces @ by_pressure.matrix[: 4 * slab.fastenings]
+    return operator
+
+
+def _seat_forces_of_loads(design: SlabMatrices) -> Reals:
+    """Forces of the seats, as in a table, from loads on the step's mesh that they make up, shape (n, 4 seats)."""
+    seats = len(design.seat_x)
+    loads = np.zeros((design.n, 4, seats))
+    for seat in range(seats):
+        for side in range(2):
+            loads[design.seat_index[seat, side], side, seat] = design.seat_w[seat, side]
+            loads[design.seat_index[seat, side], 2 + side, seat] = design.seat_slope[seat, side]
+    inverse: Reals = np.asarray(np.linalg.pinv(loads.reshape(design.n, -1)), np.float64)
+    return inverse.T
+
+
+def pressures_felt(design: SlabMatrices) -> Reals:
+    """Deflections at the bed's quadrature points times its factors, by the slab's coordinates, shape (n, points).
+
+    Args:
+        design: Matrices of the slab.
+    """
+    elements, points = design.bed_factor.shape
+    shapes = np.zeros((design.n, elements, points))
+    for e, index in enumerate(design.bed_index):
+        shapes[index, e] = design.bed_shape.T
+    return (shapes * design.bed_factor).reshape(design.n, -1)
 
 
 def _of_free_plate(slab: Slab, K: sp.csr_array, M: sp.csr_array, loads: Reals) -> Reals:

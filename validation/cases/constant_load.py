@@ -117,6 +117,8 @@ def _wheelset(given: Ingredients) -> TrainModel:
         wheelset_vehicle=np.zeros(1, dtype=np.int32), wheel_radius=given.train.wheel_radius[0] * one,
         half_spacing=given.train.half_spacing[0] * one, wheelset_mass=2.0 * LOAD / 9.81 * one,
         wheelset_spin_inertia=np.zeros(1), body_names=("wheelset",),
+        body_x=np.zeros(1), body_height=np.zeros(1), body_vehicle_x=np.zeros(1), body_inertia=np.zeros((1, 3)),
+        K_leaning=none, grade_force=np.zeros((5, 1)),
         element_index=np.zeros((0, 12), dtype=np.int32), element_row=np.zeros((0, 12)),
         element_kind=np.zeros(0, dtype=np.int32), element_linear=np.zeros(0), element_table=np.zeros((0, 2, 2)),
         element_names=(),
@@ -152,7 +154,7 @@ def history(speed: int, numerics: Numerics) -> History:
     missing = LOAD * float(model.constants[at.RESIDUAL_VERTICAL])
     model.vehicle_load[:] = 0.0
     steps, last = (int(np.ceil(distance / (V * dt))) for distance in (RAMP + SETTLE + d, d))
-    state, chunk = state_at_rest(model), Chunk.empty(model.ingredients, steps, 1, 1)
+    state, chunk = state_at_rest(model), Chunk.empty(model.ingredients, steps, 1)
     stepper = make_stepper(model, state, chunk)
     X = V * dt * np.arange(1.0, steps + 1)
     stepper.load(X, np.full(steps, V), np.zeros(steps), _switched_on(chunk.irregularity, X))

@@ -58,7 +58,7 @@ def _supported() -> tuple[float, float]:
     state = state_at_rest(model)
     equilibrium(model, state, 0.0, V)
     count = 2 * STEPS // SLABS
-    chunk = Chunk.empty(model.ingredients, 2 * count, 2 * count, 1)
+    chunk = Chunk.empty(model.ingredients, 2 * count, 1)
     stepper = make_stepper(model, state, chunk)
     X = V * DT * np.arange(1.0, 2 * count + 1)
     stepper.load(X, np.full(2 * count, V), np.zeros(2 * count), np.zeros_like(chunk.irregularity))

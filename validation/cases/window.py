@@ -103,7 +103,7 @@ def _seats_of_window(kind: Kind) -> Reals:
     state = state_at_rest(model)
     equilibrium(model, state, scenario.rear, V)
     steps = int(scenario.train.distance / (V * FINE))
-    stepper = make_stepper(model, state, Chunk.empty(model.ingredients, steps, 1, 1))
+    stepper = make_stepper(model, state, Chunk.empty(model.ingredients, steps, 1))
     X = scenario.rear + V * FINE * np.arange(1.0, steps + 1)
     stepper.load(X, np.full(steps, V), np.zeros(steps), np.zeros_like(stepper.chunk.irregularity))
     forces = np.zeros((steps, len(chosen)))
@@ -122,7 +122,7 @@ def _seats_of_full(kind: Kind) -> Reals:
     """Vertical force of the chosen seats in the full-length model."""
     scenario = _scenario(kind)
     steps = len(_seats_of_window(kind))
-    stepper = prepare_full(scenario, _rail(kind, FINE), steps, 1, 1)
+    stepper = prepare_full(scenario, _rail(kind, FINE), steps, 1)
     load(stepper, scenario, make_irregularity(scenario.irregularity, 0.0), float(scenario.train.start), 1e3)
     slab, seat = np.divmod(np.array([*NEIGHBOURS, *VOID_SEATS]), SEATS_PER_SLAB)
     forces = np.zeros((steps, len(slab)))

@@ -268,7 +268,7 @@ def explicit_forces(
     K: Reals2,
     C: Reals2,
     C_speed: Reals2,
-    vehicle_load: Reals2,
+    vehicle_load: Reals1,
     wheelset_dof: Ints2,
     wheel: Reals2,
     element_index: Ints2,
@@ -289,12 +289,17 @@ def explicit_forces(
             predict_rails(constants, numbers, stiffness, rails)
             predict_vehicle(constants, numbers, speed, K, C, C_speed, motion)
         fold(numbers, target, sign, rails, folded_out)
-        engine.vehicle_forces(0, clock[step, at.SPEED_RATE], at.V, dims, vehicle_load, wheelset_dof, wheel, motion)
+        n = motion.shape[1]
+        engine.vehicle_forces(
+            0, clock[step, at.SPEED_RATE], at.V, n, element_kind.shape[0], dims, vehicle_load, wheelset_dof, wheel,
+            motion,
+        )  # fmt: skip
         for i in range(motion.shape[1]):
             motion[at.F, i] = motion[at.F, i] + motion[at.LINEAR, i]
         suspension.add_suspension_forces(
-            0, element_index, element_row, element_kind, element_linear, element_table, motion, at.U, at.V, at.F
-        )
+            0, element_index, element_row, element_kind, element_linear, element_table, motion, at.U, at.V, at.F,
+            vehicle_load, 2 * n,
+        )  # fmt: skip
 
 
 @ti.kernel
@@ -355,6 +360,6 @@ def implicit_and_contact(
         add_wheels(constants, inverse, shape_out, rail_before_out, rails)
         add_vehicle_response(vehicle_response, wheelset_before_out, motion)
         update_vehicle(constants, motion)
-        if tick[at.LAST_PASS] == 1 and tick[at.WHEEL_RECORD] >= 0:
+        if tick[at.LAST_PASS] == 1:
             for w in range(dims[at.WHEELSETS]):
-                ct.record_wheels(0, w, tick[at.WHEEL_RECORD], contact_out, force_out, rail_force_out, wheel_record_out)
+                ct.record_wheels(0, w, tick[at.STEP], contact_out, force_out, rail_force_out, wheel_record_out)

@@ -77,8 +77,8 @@ def run_full_length(
         return _run(scenario, numerics, output, force, progress)
 
 
-def prepare(scenario: Scenario, numerics: FullLength, steps: int, wheel_rows: int, body_rows: int) -> FullStepper:
-    """Build the track, start from steady rolling, and bind the kernels to buffers of the given steps and rows."""
+def prepare(scenario: Scenario, numerics: FullLength, steps: int, body_rows: int) -> FullStepper:
+    """Build the track, start from steady rolling, and bind the kernels to buffers of so many steps."""
     if not scenario.train.speed.is_constant:
         raise InputError("train.speed_kmh: must be one number in the full-length model")
     if scenario.numerics.start != "equilibrium":
@@ -89,7 +89,7 @@ def prepare(scenario: Scenario, numerics: FullLength, steps: int, wheel_rows: in
     track = build_track(scenario, given, numerics.length, numerics.modes_per_metre, numerics.slab_modes)
     state = FullState.at_rest(track)
     steady_rolling(track, state, scenario, given, V)
-    return FullStepper(track, state, Buffers.empty(track, steps, wheel_rows, body_rows), V)
+    return FullStepper(track, state, Buffers.empty(track, steps, body_rows), V)
 
 
 def load(stepper: FullStepper, scenario: Scenario, irregularity: Irregularity, position: float, end: float) -> Reals:
@@ -119,8 +119,7 @@ def _run(
 ) -> Result:
     clock = time.perf_counter()
     recorder = Recorder(scenario, numerics.time_step)
-    rows = (CHUNK_STEPS // every + 1 for every in (recorder.wheel_every, recorder.body_every))
-    stepper = prepare(scenario, numerics, CHUNK_STEPS, *rows)
+    stepper = prepare(scenario, numerics, CHUNK_STEPS, CHUNK_STEPS // recorder.body_every + 1)
     track = stepper.track
     attributes: dict[str, Any] = {
         **{f"dofs_{name}": count for name, count in track.dof_counts.items() if name != "total"},
@@ -156,8 +155,9 @@ def _loop(
     while position < end - 1e-9:
         chainage = load(stepper, scenario, irregularity, position, end)
         count = len(chainage)
-        for step in recorder.rows(done, count):
-            stepper.step(*step)
+        plan = recorder.plan(done, count)
+        for step, body in zip(plan.step.tolist(), plan.body.tolist(), strict=True):
+            stepper.step(step, body)
         if not np.isfinite(stepper.state.force).all():
             raise RuntimeError(f"the full-length model ran away before {chainage[-1]:.1f} m; shorten the time step")
         before = time.perf_counter()

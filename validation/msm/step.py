@@ -68,7 +68,7 @@ class Buffers:
     Attributes:
         clock: Chainage of the first vehicle's centre, speed, its rate at the end of each step, shape (steps, N_CLOCK).
         irregularity: Track channels at the wheelsets, shape (1, steps, W, N_IRREGULARITY).
-        wheel: Recorded wheel output, shape (1, rows, W, 2, N_WHEEL).
+        wheel: Wheel output of every step, shape (1, steps, W, 2, N_WHEEL).
         body: Recorded motion of the bodies, shape (1, rows, 3, 5 bodies).
         slabs: Displacement and velocity of the slabs, recorded with the bodies, shape (rows, 2, slabs, m + 2).
     """
@@ -80,13 +80,13 @@ class Buffers:
     slabs: Reals
 
     @classmethod
-    def empty(cls, track: FullTrack, steps: int, wheel_rows: int, body_rows: int) -> Buffers:
+    def empty(cls, track: FullTrack, steps: int, body_rows: int) -> Buffers:
         """Zeros."""
         W, bodies = len(track.wheel), len(track.train.body_names)
         return cls(
             clock=np.zeros((steps, at.N_CLOCK)),
             irregularity=np.zeros((1, steps, W, at.N_IRREGULARITY)),
-            wheel=np.zeros((1, wheel_rows, W, 2, at.N_WHEEL)),
+            wheel=np.zeros((1, steps, W, 2, at.N_WHEEL)),
             body=np.zeros((1, body_rows, 3, 5 * bodies)),
             slabs=np.zeros((body_rows, 2, track.slabs, track.slab_modes + 2)),
         )
@@ -148,10 +148,10 @@ class FullStepper:
             ),
         )  # fmt: skip
 
-    def step(self, i: int, wheel_row: int = -1, body_row: int = -1) -> None:
-        """Advance to the end of step ``i`` of the chunk; with the rows of the records to fill, -1 for none."""
+    def step(self, i: int, body_row: int = -1) -> None:
+        """Advance to the end of step ``i`` of the chunk; with the row of the bodies' record to fill, -1 for none."""
         tick, last = self._tick, self.track.passes - 1
-        tick[at.STEP], tick[at.WHEEL_RECORD] = i, wheel_row
+        tick[at.STEP] = i
         self._predict_slabs()
         for k in range(last + 1):
             tick[at.PASS], tick[at.LAST_PASS] = k, k == last

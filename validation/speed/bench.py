@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tiengine.engine.stepper import Stepper
+from tiengine.engine.stepper import Plan, Stepper
 from tiengine.model.model import Ingredients, build_model
 from tiengine.profiling.timed_loop import StageTimer, Times
 from tiengine.scenario.scenario import Scenario
@@ -23,9 +23,9 @@ WARM_UP = 100  # steps
 class _AllTimed(StageTimer):
     """Stage timers in every step."""
 
-    def take(self, stepper: Stepper, rows: Iterable[tuple[int, int, int]]) -> None:
+    def take(self, stepper: Stepper, plan: Plan) -> None:
         """Take the steps of a chunk."""
-        self.take_timed(stepper, list(rows))
+        self.take_timed(stepper, plan)
 
 
 @dataclass(eq=False)

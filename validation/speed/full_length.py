@@ -78,7 +78,7 @@ def profile_full_length(slab_modes: int, steps: int) -> dict[str, Any]:
     scenario = load_scenario("paper", settings_of(RUNS["paper"], distance))
     numerics = FullLength(RAIL, MODES_PER_METRE, slab_modes, float(scenario.numerics.time_step))
     with threadpool_limits(1):
-        stepper = prepare(scenario, numerics, *(WARM_UP + steps,) * 3)
+        stepper = prepare(scenario, numerics, *(WARM_UP + steps,) * 2)
         start = scenario.rear + scenario.centre_in_window
         load(stepper, scenario, make_irregularity(scenario.irregularity, start + 50.0), start, start + distance)
         spent: Counter[str] = Counter()
@@ -88,11 +88,11 @@ def profile_full_length(slab_modes: int, steps: int) -> dict[str, Any]:
         for method in ("to_seats", "from_seats"):
             object.__setattr__(transform, method, _timed(getattr(transform, method), TRANSFORMS, spent))
         for i in range(WARM_UP):  # the first launches load their kernels
-            stepper.step(i, i, i)
+            stepper.step(i, i)
         spent.clear()
         clock = time.perf_counter_ns()
         for i in range(WARM_UP, WARM_UP + steps):
-            stepper.step(i, i, i)
+            stepper.step(i, i)
         whole = time.perf_counter_ns() - clock
         spent["seats, transforms apart"] -= spent[TRANSFORMS]
         spent[REST] = whole - sum(spent.values())

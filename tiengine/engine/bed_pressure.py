@@ -1,0 +1,56 @@
+"""Extreme pressures of the mortar under recorded slabs, where the bed is wholly implicit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from tiengine.engine.chunk import Chunk
+from tiengine.model.model import Model
+from tiengine.parameters.arrays import Ints
+
+__all__ = ["designs_in_slots", "fill_pressures"]
+
+BLOCK = 256
+"""Slabs of a product: its result stays in the cache while it is scaled and searched."""
+
+
+def fill_pressures(model: Model, chunk: Chunk) -> None:
+    """Compute the largest and smallest pressure of every slab in every filled row.
+
+    The pressure of the slab's weight, and k_m u + c_m v at the quadrature points of the bed.
+
+    Args:
+        model: Gives the bed's points, stiffness and damping, factors and pressures at rest by design.
+        chunk: ``slab`` and ``rear_slab`` are read, ``mortar`` is filled.
+    """
+    (k, c), rows = model.bed_numbers[:2], chunk.filled
+    kinds = designs_in_slots(model.ingredients.designs.of_slab, chunk.rear_slab[:rows], chunk.mortar.shape[2]).ravel()
+    factor, at_rest = (values.reshape(len(values), -1) for values in (model.bed_factor, model.bed_rest))
+    for motion, out in zip(chunk.slab, chunk.mortar, strict=True):
+        moved = k * motion[:rows, 0] + c * motion[:rows, 1]
+        slabs, extremes = moved.reshape(len(kinds), moved.shape[-1]), out.reshape(-1, 2)
+        for first in range(0, len(kinds), BLOCK):
+            part = slice(first, first + BLOCK)
+            kind = kinds[part]
+            pressure = slabs[part] @ model.bed_points
+            pressure *= factor[kind]
+            pressure += at_rest[kind]
+            pressure.max(axis=1, out=extremes[part][: len(kind), 0])
+            pressure.min(axis=1, out=extremes[part][: len(kind), 1])
+
+
+def designs_in_slots(of_slab: Mapping[int, int], rear_slab: Ints, slots: int) -> Ints:
+    """Design of the slab in each slot, shape (rows, slots).
+
+    Args:
+        of_slab: Design of the slabs (by index along the track) that are not sound.
+        rear_slab: Rear slab in memory, shape (rows,).
+        slots: Slabs in memory.
+    """
+    slab = rear_slab[:, None] + (np.arange(slots) - rear_slab[:, None]) % slots
+    designs = np.zeros_like(slab)
+    for number, design in of_slab.items():
+        designs[slab == number] = design
+    return designs

@@ -1,0 +1,1 @@
+"""Experiments on studies: throughput of many short trains, kills, and separate hosts."""
