@@ -102,3 +102,26 @@ MOTION_ROWS = 7
     RELATIVE_SHIFT,
     N_WHEEL,
 ) = range(18)
+
+# Output of the patches of a wheel after its own, patch by patch, if it can have two; the angle in the track's frame.
+(
+    PATCH_NORMAL_FORCE,
+    PATCH_POSITION_WHEEL,
+    PATCH_POSITION_RAIL,
+    PATCH_ANGLE,
+    PATCH_LONGITUDINAL_CREEPAGE,
+    PATCH_LATERAL_CREEPAGE,
+    PATCH_SPIN_CREEPAGE,
+    PATCH_LONGITUDINAL_CREEP_FORCE,
+    PATCH_LATERAL_CREEP_FORCE,
+    PATCH_SPIN_MOMENT,
+    N_PATCH,
+) = range(11)
+
+CONTACT_ROWS = {1: 2, 2: 6}
+"""Rows of a wheelset in the arrays of contact states and local forces, by the patches of a wheel: left and right wheel,
+with two patches then left and right of the first and of the second. A wheel's forces are the sums over its patches, its
+contact state is that of the patch with the larger normal force."""
+
+N_WHEEL_RECORD = {1: N_WHEEL, 2: N_WHEEL + 2 * N_PATCH}
+"""Length of a wheel's output, by its patches."""

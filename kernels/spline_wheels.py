@@ -9,6 +9,7 @@ import taichi as ti
 
 from tiengine.kernels import contact as ct
 from tiengine.kernels import layout
+from tiengine.kernels import patches as pt
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels.types import Array, Template
 from tiengine.kernels.vehicle_columns import INVERSE_COLUMNS, load_row, number
@@ -145,7 +146,7 @@ def contact_of_train(
     place: Array, wheelset_place: Array, car_columns_start: Array, columns: Array, wheel: Array, table: Array,
     irregularity: Array, wheelset_compliance: Array, coupling: Array, contact: Array, force: Array,
     wheelset_force: Array, rail_force: Array, iterations_out: Array, wheel_record_out: Array, car: Array,
-    under: Array, load: Array, size: Array, blocks: Template,
+    under: Array, load: Array, size: Array, blocks: Template, patches: Template,
 ):  # fmt: skip
     """Solve the contact of all wheelsets of a train, one after another, and leave the rails' loads in ``under``.
 
@@ -165,16 +166,16 @@ def contact_of_train(
         before = ti.Vector.zero(ti.f64, 5)
         for m in ti.static(range(5)):
             before[m] = wheelset_force[b, w, m]
-        count = ct.solve_wheelset(
+        count = pt.solve_wheelset(
             b, w, V, x, dx, left, right, channels, dims, constants, wheel, table, wheelset_compliance, coupling,
-            contact, force, wheelset_force, rail_force, tolerance,
+            contact, force, wheelset_force, rail_force, tolerance, patches,
         )  # fmt: skip
         add_wheelset_change(
             b, w, start, before, wheelset_place, wheelset_force, car_columns_start, columns, car, blocks
         )
         iterations_out[b, w] = ti.max(iterations_out[b, w], count)
         if record >= 0:
-            ct.record_wheels(b, w, record, contact, force, rail_force, wheel_record_out)
+            pt.record_wheels(b, w, record, contact, force, rail_force, wheel_record_out, patches)
     for w in range(dims[layout.WHEELSETS]):
         p = (c * dims[layout.WHEELSETS] + w) * N_UNDER + LOAD
         for side in ti.static(range(2)):

@@ -20,7 +20,7 @@ class Chunk:
     Attributes:
         clock: Window at the end of each step, shape (steps, N_CLOCK).
         irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
-        wheel: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL).
+        wheel: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL_RECORD).
         body: Recorded displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
         slab: Displacement, velocity, acceleration of the slabs' coordinates, with the bodies, shape (B, rows, 3, slots,
             dofs).
@@ -46,7 +46,7 @@ class Chunk:
         return cls(
             clock=np.zeros((steps, at.N_CLOCK)),
             irregularity=np.zeros((B, steps, W, at.N_IRREGULARITY)),
-            wheel=np.zeros((B, steps, W, 2, at.N_WHEEL)),
+            wheel=np.zeros((B, steps, W, 2, at.N_WHEEL_RECORD[ingredients.contact.patches])),
             body=np.zeros((B, rows, 3, 5 * bodies)),
             slab=np.zeros((B, rows, 3, slots, ingredients.designs.matrices[0].n)),
             rear_slab=np.zeros(rows, dtype=np.int64),

@@ -44,9 +44,9 @@ class Contact:
 
     Attributes:
         wheel: r0, b0, spin inertia, shape (W, 3).
-        table: Contact geometry, shape (n_u, n_alpha, N_TABLE).
-        contact: Contact states, shape (B, W, 2, N_CONTACT).
-        force: N, Fx, Fy, Mz on the wheels, shape (B, W, 2, 4).
+        table: Contact geometry, shape (n_u, n_alpha, N_TABLE patches).
+        contact: Contact states, shape (B, W, CONTACT_ROWS, N_CONTACT).
+        force: N, Fx, Fy, Mz on the wheels, shape (B, W, CONTACT_ROWS, 4).
         wheelset_force: On y, z, roll, pitch, yaw, shape (B, W, 5).
         rail_force: On w, v, theta_x, shape (B, W, 2, 3).
         iterations: Most Newton iterations, shape (B, W).
@@ -59,6 +59,11 @@ class Contact:
     wheelset_force: Floats
     rail_force: Floats
     iterations: Ints
+
+    @property
+    def patches(self) -> int:
+        """Patches a wheel can have."""
+        return int(self.table.shape[2]) // layout.N_TABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +134,7 @@ class SplineStep:
             contact: Arrays of the contact.
             clock: Window at the end of each step, shape (steps, N_CLOCK).
             irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
-            wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL).
+            wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL_RECORD).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
             slab_record: Displacement, velocity, acceleration of every slab coordinate where the bodies are recorded,
                 vectors, shape (B rows groups N 3, 8).
@@ -166,7 +171,7 @@ class SplineStep:
                    state.car, cars.columns, car_load)  # fmt: skip
         self.launch = VectorLaunch(
             step_kernel,
-            (state.lanes, slabs.half_width, cars.blocks),
+            (state.lanes, slabs.half_width, cars.blocks, contact.patches),
             arrays,
             frozenset(i for i, array in enumerate(arrays) if any(array is vector for vector in vectors)),
         )

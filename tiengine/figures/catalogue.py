@@ -74,7 +74,8 @@ KINDS = (
     Kind(
         "contact",
         "Contact positions",
-        "Contact should stay on the tread; a second peak near the flange root (negative positions) is flange contact.",
+        "Contact should stay on the tread; a second peak near the flange root (negative positions) is flange contact."
+        " Filled: the second patch, where wheels may have two.",
     ),
     Kind(
         "ride",

@@ -324,6 +324,11 @@ def _check_trial_functions(scenario: Scenario) -> None:
     """Check how many trial functions describe a rail, and that seats do not reach over too many of them."""
     window, numerics = scenario.window_length, scenario.numerics
     sines = numerics.trial_functions == "sines"
+    if numerics.threads > 1 and not sines:
+        raise InputError(
+            f"numerics.threads = {numerics.threads}: must be 1 with splines, whose step has one thread; several trains"
+            " share the cores by worker processes (--workers)"
+        )
     most, fewer = (MOST_MODES, "numerics.modes_per_metre") if sines else (MOST_KNOTS, "density of numerics.knots")
     count = numerics.modes(window) if sines else int(window / numerics.knots.finest)
     if window > LONGEST_WINDOW or count > most:

@@ -146,6 +146,11 @@ def _line(
 class Contact(Params):
     """Wheel-rail contact."""
 
+    patches: Annotated[
+        Literal[1, 2],
+        Field(description="contact patches a wheel can have; 2 lets tread and flange carry load at the same time"),
+    ] = 1
+
     hertz: Annotated[
         Literal["exact", "zhai_worn", "zhai_cone"],
         Field(description="approach by Hertz from the curvatures, or by Zhai's formulas for worn or conical treads"),
@@ -210,9 +215,7 @@ class Numerics(Params):
     slab_count: Annotated[
         Literal["cover", "paper"], Field(description="slabs under the whole window, or the source paper's count")
     ] = "cover"
-    threads: Annotated[
-        int, Q("-", "threads of Taichi's loop over trains, with sines; all else uses one", ge=1, le=1024)
-    ] = 1
+    threads: Annotated[int, Q("-", "threads of Taichi's loop over trains; 1 with splines", ge=1, le=1024)] = 1
 
     def modes(self, window: float) -> int:
         """Sines of each rail field in a window of the given length [m]."""
