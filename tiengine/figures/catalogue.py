@@ -53,6 +53,24 @@ KINDS = (
         " within the dashed limits; where the grey band reaches zero, a wheel has lost contact with the rail.",
     ),
     Kind(
+        "alignment",
+        "Alignment",
+        "Curvature, cant and gradient of the line that was run; the cant deficiency is what the wheels have to carry"
+        " sideways, 153 mm for each m/s² of unbalanced acceleration.",
+    ),
+    Kind(
+        "curving",
+        "Forces in curves",
+        "In an arc the forces settle to quasi-static values, the outer wheels carry more; jumps at the ends of"
+        " transitions would point to a fault of the line.",
+    ),
+    Kind(
+        "steering",
+        "Steering",
+        "A wheelset that stands radially has no yaw; a leading wheelset that yaws by several mrad in a sharp curve runs"
+        " against the outer rail with its flange.",
+    ),
+    Kind(
         "envelopes",
         "Fastenings and slabs",
         "Neighbouring fastenings take over the load of a failed one: the upper panel shows their load relative to a"
