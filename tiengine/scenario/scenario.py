@@ -162,6 +162,7 @@ def _members(scenario: Scenario) -> tuple[Scenario, ...]:
         key = repr(ensemble.changes(i))
         if key not in made:
             made[key] = _changed(tables, ensemble, i)
+            _ = made[key].parts  # kept with the scenario and in its copies
         train = made[key]
         if "irregularity.seed" not in ensemble.vary:
             seeded = train.irregularity.model_copy(update={"seed": ensemble.seed(i, first)})
