@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib import animation, rc_context
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, FancyBboxPatch
+from matplotlib.patches import Ellipse, FancyBboxPatch
 
 from tiengine.figures.palette import BLACK, GREY, ORANGE, SKY, VERMILION
 from tiengine.figures.scene import CAR, FRAME, Scene, read_scene
@@ -50,7 +50,7 @@ class Animation:
         self.figure: Figure = new_figure(10.5, f"{caption}: deflections {enlarged:g} times enlarged")
         self._side, self._bars = self.figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         low, high = scene.wheel_x.min() - MARGIN, scene.wheel_x.max() + MARGIN
-        self._side.set(xlim=(max(low, scene.offset[0]), min(high, scene.offset[-1])), ylim=(-2.4, 4.2), yticks=[])
+        self._side.set(xlim=(max(low, scene.offset[0]), min(high, scene.offset[-1])), ylim=(-1.7, 4.0), yticks=[])
         self._side.set_facecolor("#F7F9FB")
         self._draw_track()
         self._draw_bodies()
@@ -71,11 +71,11 @@ class Animation:
         moved = -scale * (scene.body_z[frame] - scene.body_z.mean(axis=0))
         for patch, body in self._boxes:
             patch.set_y(LEVEL[scene.body_kind[body]] - 0.5 * HEIGHT[scene.body_kind[body]] + moved[body])
-        for w, circle in enumerate(self._wheels):
+        for w, wheel in enumerate(self._wheels):
             sunk = np.interp(scene.wheel_x[w], scene.offset, scene.rail[frame].mean(axis=0))
             off = bool(scene.lifted[frame, w].any())
-            circle.set_center((scene.wheel_x[w], scene.wheel_radius - scale * sunk + 0.25 * off))
-            circle.set_facecolor(VERMILION if off else GREY)
+            wheel.set_center((scene.wheel_x[w], scene.wheel_radius - scale * sunk + 0.25 * off))
+            wheel.set_facecolor(VERMILION if off else GREY)
         for side, bars in enumerate(self._of_wheels):
             for w, bar in enumerate(bars):
                 bar.set_height(1e-3 * scene.force[frame, w, side])
@@ -98,7 +98,7 @@ class Animation:
         self._text = self._side.text(0.01, 0.96, "", transform=self._side.transAxes, va="top", fontsize=8.0)
 
     def _draw_bodies(self) -> None:
-        """Boxes of cars and frames, circles of wheels."""
+        """Boxes of cars and frames, and wheels."""
         scene = self._scene
         self._boxes: list[tuple[Any, int]] = []
         for body, kind in enumerate(scene.body_kind):
@@ -111,8 +111,12 @@ class Animation:
                 facecolor=color, edgecolor=BLACK, linewidth=0.8,
             )  # fmt: skip
             self._boxes.append((self._side.add_patch(box), body))
+        self.figure.draw_without_rendering()  # lays the panels out, whose scales make a wheel round
+        box, radius = self._side.get_window_extent(), scene.wheel_radius
+        across, up = np.ptp(self._side.get_xlim()) / box.width, np.ptp(self._side.get_ylim()) / box.height
+        width = 2.0 * radius * across / up
         self._wheels = [
-            self._side.add_patch(Circle((x, scene.wheel_radius), scene.wheel_radius, edgecolor=BLACK, facecolor=GREY))
+            self._side.add_patch(Ellipse((x, radius), width, 2.0 * radius, edgecolor=BLACK, facecolor=GREY))
             for x in scene.wheel_x
         ]
 

@@ -20,15 +20,15 @@ __all__ = ["measure"]
 
 PLAN: dict[str, Any] = {
     "scenario": "default",
-    "seeds": 24,
-    "set": {"train.distance": 40.0, "output.run_in": 2.0, "output.precision": "double"},
+    "seeds": 12,
+    "set": {"train.distance": 20.0, "output.run_in": 2.0, "output.precision": "double"},
     "factors": [
         {"key": "train.speed_kmh", "name": "speed", "values": [260.0, 270.0, 280.0, 290.0, 300.0, 310.0, 320.0, 330.0]}
     ],
 }
-"""192 trains in 16 tasks of twelve, each of three chunks of steps."""
+"""96 trains in eight tasks of twelve, each of two chunks of steps."""
 
-LATEST = 8.0  # s after the first worker has begun: within the first tasks or after some of them
+LATEST = 5.0  # s after the first worker has begun: within the first tasks or after some of them
 BEGUN = 60.0  # s until it has at the latest
 
 
