@@ -72,7 +72,8 @@ MOTION_ROWS = 7
 (POSITION, SPEED, SPEED_RATE, FIRST_SEAT_S, FIRST_SEAT, FIRST_SLAB, N_CLOCK) = range(7)
 
 # Entries of ``tick`` (int32): step, pass and record of a launch.
-(STEP, PASS, LAST_PASS, N_TICK) = range(4)
+# LOAD_STEP and LOAD_TRAIN: numbers from a step's row of loads to the next step's, from a train's to the next train's.
+(STEP, PASS, LAST_PASS, LOAD_STEP, LOAD_TRAIN, N_TICK) = range(6)
 
 # Channels of the irregularity at a wheelset: track values and their slopes along x.
 (Z_V, Y_A, CROSS_LEVEL, GAUGE, Z_V_SLOPE, Y_A_SLOPE, CROSS_LEVEL_SLOPE, GAUGE_SLOPE, N_IRREGULARITY) = range(9)

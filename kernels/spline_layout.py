@@ -64,8 +64,10 @@ WHEEL_ROWS, WHEEL_COLUMNS, N_WHEEL_FUNCTION = 0, 16, 24
     CAR_DOFS,  # coordinates of a car
     ELEMENTS,  # nonlinear suspension elements
     PASSES,
+    LOAD_STEP,  # vectors from a step's row of loads to the next step's, 0 if all have the same
+    LOAD_TRAIN,  # from a train's rows to the next train's
     N_SIZE,
-) = range(10)
+) = range(12)
 
 # Entries of ``job`` (int32): what a launch does.
 (FIRST_STEP, STEPS, STAGES, N_JOB) = range(4)

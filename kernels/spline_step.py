@@ -199,8 +199,9 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
                 if stages & at.CAR_STAGE:
                     for b in range(b0, b_end):
                         cars.loads(
-                            b, row_u, row_v, V_rate, size, dims, car_load, wheelset_place, wheel, wheelset_force,
-                            element_place, element_row, element_kind, element_linear, element_table, car, blocks,
+                            b, row_u, row_v, V_rate, cars.load_row(b, step, size, blocks), size, dims, car_load,
+                            wheelset_place, wheel, wheelset_force, element_place, element_row, element_kind,
+                            element_linear, element_table, car, blocks,
                         )  # fmt: skip
                         for i in range(size[at.CARS]):
                             base = b * train_car + i * at.CAR_ROWS * blocks
@@ -222,7 +223,7 @@ def step_kernel(lanes: int, K: int, blocks: int) -> Any:
                             b, c, 2 * (b - b0), step, V, tolerance, row, dims, constants, wheel_place,
                             wheelset_place, car_columns_start, car_columns, wheel, table, irregularity,
                             wheelset_compliance, coupling, contact, force, wheelset_force, rail_force, iterations,
-                            wheel_record, car, under, size[at.CARS], blocks,
+                            wheel_record, car, under, car_load, size, blocks,
                         )  # fmt: skip
                     wheels.add_wheel_columns(c, first, dims, wheel_place, wheel_rows, rail, under)
                 if stages & at.BACKWARD_STAGE:

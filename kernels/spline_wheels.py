@@ -11,7 +11,7 @@ from tiengine.kernels import contact as ct
 from tiengine.kernels import layout
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels.types import Array, Template
-from tiengine.kernels.vehicle_columns import INVERSE_COLUMNS, number
+from tiengine.kernels.vehicle_columns import INVERSE_COLUMNS, load_row, number
 
 # Vectors of a wheelset in ``under``: both rails under it at the predictors, at the step's end without a change of the
 # wheels' forces (w, v, theta_x, slopes, rates at constant s), then the wheels' forces on w, v, theta_x.
@@ -145,18 +145,21 @@ def contact_of_train(
     place: Array, wheelset_place: Array, car_columns_start: Array, columns: Array, wheel: Array, table: Array,
     irregularity: Array, wheelset_compliance: Array, coupling: Array, contact: Array, force: Array,
     wheelset_force: Array, rail_force: Array, iterations_out: Array, wheel_record_out: Array, car: Array,
-    under: Array, cars: int, blocks: Template,
+    under: Array, load: Array, size: Array, blocks: Template,
 ):  # fmt: skip
     """Solve the contact of all wheelsets of a train, one after another, and leave the rails' loads in ``under``.
 
-    ``lane`` is the train's left rail; ``record`` is the row of the wheels' record to fill, -1 for none; other
-    arguments as in ``contact``, ``vehicle_columns`` and this module.
+    A wheelset yaws against the rails with its own rate and that of the track frame. ``lane`` is the train's left rail;
+    ``record`` is the row of the wheels' record to fill, -1 for none; other arguments as in ``contact``,
+    ``vehicle_columns`` and this module.
     """
-    start = b * cars * at.CAR_ROWS * blocks * 8
+    start = b * size[at.CARS] * at.CAR_ROWS * blocks * 8
+    yaw_rate = (load_row(b, step, size, blocks) + size[at.CARS] * blocks) * 8 + size[at.ELEMENTS]
     for w in range(dims[layout.WHEELSETS]):
         p = (c * dims[layout.WHEELSETS] + w) * N_UNDER
         channels = ct.channels_at(b, step, w, irregularity)
         x, dx = wheelset_without_change(b, w, start, constants, wheelset_place, car, blocks)
+        dx[4] += number(load, yaw_rate + w)
         left = rail_without_change(b, w, 0, p, lane, dims, constants, place, coupling, rail_force, under)
         right = rail_without_change(b, w, 1, p, lane + 1, dims, constants, place, coupling, rail_force, under)
         before = ti.Vector.zero(ti.f64, 5)

@@ -32,21 +32,25 @@ from tiengine.kernels.types import Array, Ints1, Ints2, Reals1, Reals2, Reals3, 
 
 @ti.func
 def vehicle_forces(
-    b: int, V_rate: float, row_v: int, dims: Array, load: Array, dof: Array, wheel: Array, motion: Array
-):
-    """F of the train: gravity, inertia of braking, gyroscopic pair of the wheelsets' pitch rates.
+    b: int, V_rate: float, row_v: int, given: int, elements: int, dims: Array, load: Array, dof: Array, wheel: Array,
+    motion: Array,
+):  # fmt: skip
+    """F of the train: given loads, inertia of braking, gyroscopic pair of the wheelsets' pitch rates.
 
-    Their mean spin is linear; velocities are in row ``row_v``.
+    Their mean spin is linear; velocities are in row ``row_v``, the loads of the step from ``given`` on in ``load``
+    (``tiengine.engine.load_rows``).
     """
     n = dims[at.VEHICLE_DOFS]
     base = dims[at.VEHICLES] + b * n
     for i in range(n):
-        motion[at.F, base + i] = load[0, i] + V_rate * load[1, i]
+        motion[at.F, base + i] = load[given + i] + V_rate * load[i]
+    yaw_rate = given + n + elements
+    roll_rate = yaw_rate + dims[at.WHEELSETS]
     for w in range(dims[at.WHEELSETS]):
         J = wheel[w, 2]
         roll, pitch, yaw = base + dof[w, 2], base + dof[w, 3], base + dof[w, 4]
-        motion[at.F, roll] = motion[at.F, roll] + J * motion[row_v, pitch] * motion[row_v, yaw]
-        motion[at.F, yaw] = motion[at.F, yaw] - J * motion[row_v, pitch] * motion[row_v, roll]
+        motion[at.F, roll] = motion[at.F, roll] + J * motion[row_v, pitch] * (motion[row_v, yaw] + load[yaw_rate + w])
+        motion[at.F, yaw] = motion[at.F, yaw] - J * motion[row_v, pitch] * (motion[row_v, roll] + load[roll_rate + w])
 
 
 @ti.kernel
@@ -160,7 +164,7 @@ def forces_and_contact(
     rail_pull: Reals4,
     slab_pull: Reals5,
     # vehicles
-    vehicle_load: Reals2,
+    vehicle_load: Reals1,
     wheelset_dof: Ints2,
     wheel: Reals2,
     element_index: Ints2,
@@ -206,10 +210,14 @@ def forces_and_contact(
                 slab_force_out,
             )  # fmt: skip
             fs.rail_forces(b, iterate, dims, constants, seat_shape, seat_force_out, motion)
-            vehicle_forces(b, V_rate, rows[1], dims, vehicle_load, wheelset_dof, wheel, motion)
+            n, elements = dims[at.VEHICLE_DOFS], element_kind.shape[0]
+            given = n + b * tick[at.LOAD_TRAIN] + step * tick[at.LOAD_STEP]
+            vehicle_forces(
+                b, V_rate, rows[1], given, elements, dims, vehicle_load, wheelset_dof, wheel, motion
+            )  # fmt: skip
             suspension.add_suspension_forces(
                 dims[at.VEHICLES] + b * dims[at.VEHICLE_DOFS], element_index, element_row, element_kind,
-                element_linear, element_table, motion, rows[0], rows[1], at.F,
+                element_linear, element_table, motion, rows[0], rows[1], at.F, vehicle_load, given + n,
             )  # fmt: skip
 
             tolerance = constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD]
@@ -220,6 +228,7 @@ def forces_and_contact(
             for w in range(wheelsets):
                 channels = ct.channels_at(b, step, w, irregularity)
                 x, dx = uw.wheelset_without_change(b, w, dims, constants, wheelset_dof, vehicle_answer, motion)
+                dx[4] += vehicle_load[given + n + elements + w]  # the track frame yaws too
                 left = uw.rail_without_change(
                     b, w, 0, dims, constants, rail_answer, rail_coupling, motion, rail_predicted, rail_force
                 )

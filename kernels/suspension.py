@@ -40,6 +40,8 @@ def add_suspension_forces(
     row_u: int,
     row_v: int,
     row_f: int,
+    load: Array,
+    elongation: int,
 ):
     """Add the deviations of one train's elements to ``f``.
 
@@ -54,9 +56,11 @@ def add_suspension_forces(
         row_u: Row of the displacements [m, rad].
         row_v: Row of the velocities [m/s, rad/s].
         row_f: Row of the generalised forces [N, N m], added to.
+        load: Rows of loads (``tiengine.engine.load_rows``).
+        elongation: Place in it of the elongations that the frames of the bodies make [m, m/s].
     """
     for e in range(kind.shape[0]):
-        q = 0.0
+        q = load[elongation + e]
         for k in range(row.shape[1]):
             i = base + index[e, k]
             q += row[e, k] * (motion[row_v, i] if kind[e] == 0 else motion[row_u, i])
@@ -75,6 +79,7 @@ def suspension_forces(
     kind: Ints1,
     linear: Reals1,
     table: Reals3,
+    elongation: Reals1,
     # State:
     motion_out: Reals2,
 ):
@@ -83,4 +88,4 @@ def suspension_forces(
     Train b has the columns b n to (b + 1) n.
     """
     for b in range(motion_out.shape[1] // n):
-        add_suspension_forces(b * n, index, row, kind, linear, table, motion_out, 0, 1, 2)
+        add_suspension_forces(b * n, index, row, kind, linear, table, motion_out, 0, 1, 2, elongation, 0)

@@ -87,10 +87,16 @@ def record_bodies(b: int, row: int, start: int, place: Array, car: Array, body_r
 
 
 @ti.func
+def load_row(b: int, step: int, size: Array, blocks: Template):
+    """First vector of a train's row of loads in a step."""
+    return size[at.CARS] * blocks + b * size[at.LOAD_TRAIN] + step * size[at.LOAD_STEP]
+
+
+@ti.func
 def loads(
-    b: int, row_u: int, row_v: int, V_rate: float, size: Array, dims: Array, load: Array, wheelset_place: Array,
-    wheel: Array, wheelset_force: Array, element_place: Array, element_row: Array, element_kind: Array,
-    element_linear: Array, element_table: Array, car: Array, blocks: Template,
+    b: int, row_u: int, row_v: int, V_rate: float, given: int, size: Array, dims: Array, load: Array,
+    wheelset_place: Array, wheel: Array, wheelset_force: Array, element_place: Array, element_row: Array,
+    element_kind: Array, element_linear: Array, element_table: Array, car: Array, blocks: Template,
 ):  # fmt: skip
     """CAR_LOAD of one train: gravity, braking, gyroscopic pair, suspension, the wheels' forces as they stand.
 
@@ -99,9 +105,10 @@ def loads(
         row_u: Row of the displacements.
         row_v: Row of the velocities.
         V_rate: dV/dt [m/s^2].
+        given: First vector of the step's row in ``load``.
         size: Sizes, see ``spline_layout``.
         dims: Sizes, see ``layout``.
-        load: Gravity, then force per unit rate of speed, vectors, shape (2 cars blocks,).
+        load: Force per unit rate of speed, then rows of loads (``tiengine.engine.load_rows``), vectors.
         wheelset_place: Places of y, z, roll, pitch, yaw of each wheelset in row 0 of a train, shape (W, 5).
         wheel: r0, b0, spin inertia, shape (W, 3).
         wheelset_force: Generalised forces on y, z, roll, pitch, yaw, shape (trains, W, 5).
@@ -117,19 +124,22 @@ def loads(
     for i in range(cars):
         base = (b * cars + i) * at.CAR_ROWS * blocks + at.CAR_LOAD * blocks
         for m in ti.static(range(blocks)):
-            car[base + m] = load[i * blocks + m] + V_rate * load[(cars + i) * blocks + m]
+            car[base + m] = load[given + i * blocks + m] + V_rate * load[i * blocks + m]
+    elongation = (given + cars * blocks) * 8
+    yaw_rate = elongation + size[at.ELEMENTS]
+    roll_rate = yaw_rate + dims[layout.WHEELSETS]
     start = b * cars * at.CAR_ROWS * blocks * 8
     u, v, f = start + row_u * blocks * 8, start + row_v * blocks * 8, start + at.CAR_LOAD * blocks * 8
     for w in range(dims[layout.WHEELSETS]):
         roll, pitch, yaw = wheelset_place[w, 2], wheelset_place[w, 3], wheelset_place[w, 4]
         spin = wheel[w, 2] * number(car, v + pitch)
-        add_number(car, f + roll, spin * number(car, v + yaw))
-        add_number(car, f + yaw, -(spin * number(car, v + roll)))
+        add_number(car, f + roll, spin * (number(car, v + yaw) + number(load, yaw_rate + w)))
+        add_number(car, f + yaw, -(spin * (number(car, v + roll) + number(load, roll_rate + w))))
         for m in range(5):
             add_number(car, f + wheelset_place[w, m], wheelset_force[b, w, m])
     for e in range(size[at.ELEMENTS]):
         row = v if element_kind[e] == 0 else u
-        q = 0.0
+        q = number(load, elongation + e)
         for k in range(element_row.shape[1]):
             q += element_row[e, k] * number(car, row + element_place[e, k])
         deviation = suspension.table_force(e, q, element_table) - element_linear[e] * q

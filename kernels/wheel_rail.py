@@ -18,6 +18,9 @@ from tiengine.kernels.types import Array, Template
     range(19)
 )
 
+THIRD_OF_EXPONENTS = 715094163 << 32
+"""Two thirds of the bias of a double's exponent, less what makes the first cube root's error least."""
+
 
 @ti.func
 def catmull_rom(f: float):
@@ -158,6 +161,19 @@ def saturation(tau: float):
 
 
 @ti.func
+def cube_root(x: float):
+    """Cube root of a positive number: a third of its exponent, within 4 %, then Halley's steps (4 % -> 5e-5 -> 1e-13).
+
+    A general power takes five times as long.
+    """
+    y = ti.bit_cast(ti.bit_cast(ti.cast(x, ti.f64), ti.i64) // ti.i64(3) + ti.i64(THIRD_OF_EXPONENTS), ti.f64)
+    for _ in ti.static(range(3)):
+        cube = y * y * y
+        y = y * (cube + 2.0 * x) / (2.0 * cube + x)
+    return y
+
+
+@ti.func
 def contact_law(state: Template, friction: float):
     """Forces (N, Fx, Fy, Mz) on the wheel in the contact frame, and their derivatives by (delta, xi_x, xi_y, xi_s).
 
@@ -169,7 +185,7 @@ def contact_law(state: Template, friction: float):
     delta = state[DELTA]
     if delta > 0.0:
         N = state[KH] * delta * ti.sqrt(delta)
-        third = ti.pow(N, 1.0 / 3.0)
+        third = cube_root(N)
         f11, f22 = state[K11] * third * third, state[K22] * third * third
         f23, f33 = state[K23] * N, state[K33] * N * third
         xi_x, xi_y, xi_s = state[XI_X], state[XI_Y], state[XI_S]

@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 
 from tiengine.engine.aligned import aligned_zeros
 from tiengine.engine.banded import BandedBlock
+from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.spline_arrays import SplineArrays
 from tiengine.engine.spline_step import Bed as SlabBed
 from tiengine.engine.spline_step import Contact, SplineStep, Suspension
@@ -234,8 +235,8 @@ def make_bed(
     designs.append((A - 0.5 * (beta_dt2 * K + gamma_dt * C), 0.5 * K, 0.5 * C))
     slabs = SlabTables.of(designs, first.seat_index, first.seat_w, first.seat_slope, first.seat_x)
     cars = CarTables.of(
-        train.M, train.C + V * train.C_speed, train.K, np.stack([train.gravity, train.acceleration_force]),
-        cars_of(train), train.wheelset_dof, train.element_index, beta_dt2, gamma_dt,
+        train.M, train.C + V * train.C_speed, train.K, cars_of(train), train.wheelset_dof, train.element_index,
+        beta_dt2, gamma_dt,
     )  # fmt: skip
     seat_count = int(np.ceil((given.length + pad) / c[at.SPACING])) + 1
     seats = SeatTables.of(seat_count, pad, spans)
@@ -272,6 +273,7 @@ def make_bed(
         state, model.dims, c, passes, rails, spans, seats, slabs,
         Suspension(train.element_row, train.element_kind, train.element_linear, train.element_table), contact, clock,
         irregularity, record, body_record, slab_record, slab_bed,
+        LoadRows(given, model.vehicle_load, cars.load_place, 8 * cars.blocks * len(cars.car), 8, steps),
     )  # fmt: skip
     return Bed(
         model, rail, spans, given.wheel_s, V, state, seats, slabs, rails, contact, clock, irregularity, record,

@@ -24,6 +24,7 @@ def kernel_forces(train: TrainModel, u: NDArray[np.float64], v: NDArray[np.float
         train.element_kind,
         train.element_linear,
         train.element_table,
+        np.zeros(len(train.element_kind)),
         motion,
     )
     return motion[2].reshape(u.shape)
@@ -92,7 +93,7 @@ def test_hand_values(name, part, q, force):
     alone = {key: getattr(train, key)[e : e + 1] for key in
              ("element_index", "element_row", "element_kind", "element_linear", "element_table")}  # fmt: skip
     motion = np.stack([u.ravel(), v.ravel(), np.zeros(train.n)])
-    suspension_forces(train.n, *alone.values(), motion)
+    suspension_forces(train.n, *alone.values(), np.zeros(1), motion)
     f = motion[2]
     whole = train.element_linear[e] * q - f[y] / train.element_row[e, 0]
     assert whole == pytest.approx(force, rel=1e-12, abs=1e-9)  # rounding of the difference

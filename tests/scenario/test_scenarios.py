@@ -214,6 +214,13 @@ def test_a_measured_series_limits_the_step(tmp_path):
         simulate.prepare(scenario("default", measured, "numerics.time_step=2e-4"))
 
 
+def test_threads_are_for_sines():
+    """With splines a step has one thread: a number that would do nothing is refused."""
+    assert scenario("default", "numerics.threads=2", *SINES).numerics.threads == 2
+    with pytest.raises(InputError, match=r"numerics\.threads = 2: must be 1 with splines"):
+        scenario("default", "numerics.threads=2")
+
+
 @pytest.mark.parametrize("functions", [(*SINES, "numerics.modes_per_metre=8"), (DAMPED,)])
 def test_an_unstable_step_is_refused(functions):
     """With the reason and what to change."""

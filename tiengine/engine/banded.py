@@ -15,7 +15,7 @@ from scipy.linalg import solve_banded
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels.banded_lu import factorise
 
-__all__ = ["BandedBlock", "Factors", "WheelRows", "rail_coefficients", "wheel_rows"]
+__all__ = ["BandedBlock", "Factors", "WheelRows", "add_factors", "band_of", "linear_coefficients", "wheel_rows"]
 
 NEGLIGIBLE = 1e-14  # of the largest entry: where a wheel's one-sided rows and columns are cut
 ROOM = 12  # functions more than a wheel's rows need now: they change with the speed
@@ -70,14 +70,20 @@ class Factors:
             ValueError: An entry lies outside the band, or a pivot is not positive.
         """
         gone = np.zeros(0, dtype=np.intp) if held is None else held
-        entries = sp.coo_array(A)
-        keep = ~(np.isin(entries.row, gone) | np.isin(entries.col, gone))
-        row, column, value = entries.row[keep], entries.col[keep], entries.data[keep]
-        far = np.abs(row - column) > half_width
-        if np.any(value[far]):
-            raise ValueError(f"banded block: an entry lies {np.abs(row - column).max()} off, the band has {half_width}")
-        band = np.zeros((A.shape[0], 2 * half_width + 1))
-        np.add.at(band, (row[~far], column[~far] - row[~far] + half_width), value[~far])
+        return cls.of_band(band_of(A, half_width, gone), gone)
+
+    @classmethod
+    def of_band(cls, band: NDArray[np.float64], gone: NDArray[np.intp]) -> Factors:
+        """Factorise a band in place.
+
+        Args:
+            band: See :func:`band_of`.
+            gone: Coordinates whose rows and columns are left out.
+
+        Raises:
+            ValueError: A pivot is not positive.
+        """
+        half_width = band.shape[1] // 2
         band[gone, half_width] = 1.0
         factorise(band)
         if not (band[:, half_width] > 0.0).all():
@@ -132,17 +138,27 @@ class Factors:
         return free
 
 
-def rail_coefficients(
-    vertical: BandedBlock, lateral: BandedBlock, factors: tuple[Factors, Factors]
-) -> NDArray[np.float64]:
-    """Coefficients of both blocks in the order of ``spline_layout``, shape (n, N_COEFFICIENT).
+def band_of(A: sp.sparray, half_width: int, held: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Entries of a banded matrix by rows: A[i, i - k + q], shape (N, 2k + 1); rows and columns of ``held`` are zero.
 
     Raises:
-        ValueError: K, C or A_s couples fields that the kernel does not.
+        ValueError: An entry lies outside the band.
     """
-    n = vertical.M.shape[0] // 2
-    out = np.zeros((n, at.N_COEFFICIENT))
-    for start, fields, block, factor in zip((0, 2), FIELDS, (vertical, lateral), factors, strict=True):
+    entries = sp.coo_array(A)
+    keep = ~(np.isin(entries.row, held) | np.isin(entries.col, held))
+    row, column, value = entries.row[keep], entries.col[keep], entries.data[keep]
+    far = np.abs(row - column) > half_width
+    if np.any(value[far]):
+        raise ValueError(f"banded block: an entry lies {np.abs(row - column).max()} off, the band has {half_width}")
+    band = np.zeros((A.shape[0], 2 * half_width + 1))
+    np.add.at(band, (row[~far], column[~far] - row[~far] + half_width), value[~far])
+    return band
+
+
+def add_factors(out: NDArray[np.float64], factors: tuple[Factors, Factors]) -> None:
+    """Put the factors of both blocks into their places of ``spline_layout``; ``out`` has shape (n, N_COEFFICIENT)."""
+    n = len(out)
+    for start, fields, factor in zip((0, 2), FIELDS, factors, strict=True):
         lower, upper = (side.reshape(n, fields, -1) for side in (factor.lower, factor.upper))
         inverse = factor.inverse_diagonal.reshape(n, fields)
         for f in range(fields):
@@ -153,6 +169,16 @@ def rail_coefficients(
             first = at.BACKWARD_AT + at.BACKWARD_START[start + f]
             out[:, first : first + count] = upper[:, f, :count]
             out[:, at.INVERSE_DIAGONAL + start + f] = inverse[:, f]
+
+
+def linear_coefficients(vertical: BandedBlock, lateral: BandedBlock) -> NDArray[np.float64]:
+    """K, C and A_s of both blocks in the order of ``spline_layout``, shape (n, N_COEFFICIENT); linear in the matrices.
+
+    Raises:
+        ValueError: K, C or A_s couples fields that the kernel does not.
+    """
+    out = np.zeros((vertical.M.shape[0] // 2, at.N_COEFFICIENT))
+    for start, fields, block in zip((0, 2), FIELDS, (vertical, lateral), strict=True):
         for matrix, pairs, offset, stride, name in (
             (block.K, at.STIFFNESS_PAIRS, at.LINEAR_START, at.N_LINEAR, "K"),
             (block.C, at.DAMPING_PAIRS, at.LINEAR_START + at.N_STIFFNESS, at.N_LINEAR, "C"),

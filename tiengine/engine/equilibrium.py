@@ -21,6 +21,8 @@ from tiengine.kernels import layout as at
 from tiengine.kernels.wheel_rail import N_CONTACT
 from tiengine.model.constant_data import Model
 from tiengine.parameters.errors import InputError
+from tiengine.vehicle.connector import table_force
+from tiengine.vehicle.given_loads import GivenLoads, no_loads
 
 __all__ = ["ContactForces", "equilibrium", "evaluate_contact", "release"]
 
@@ -29,6 +31,7 @@ AT_ONCE = 256  # trial states: those of sixteen vehicles, 1900, would take 200 M
 FORCE_TOLERANCE = 1e-4  # N: a billionth of a wheel load
 EASY_FRICTION = 0.3  # from the guess Newton's method is known to converge
 FRICTION_RATIO = 1.5  # from one friction to the next, where the creep forces change by a few per cent
+FIRST_SHARE, SMALLEST_SHARE = 0.25, 1.0 / 256.0  # of the given loads: a step towards them
 NUDGE_COORDINATE = 1e-8  # m, rad
 NUDGE_RATE = 1e-6  # rad/s
 NUDGE_FORCE = 1.0  # N
@@ -92,7 +95,7 @@ def evaluate_contact(
 
 
 def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 0.0) -> None:
-    """Put all trains of a state into steady rolling on a smooth track.
+    """Put all trains of a state into steady rolling on a smooth track, in a curve if they stand in one.
 
     Args:
         model: Constant data.
@@ -105,7 +108,8 @@ def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 
         InputError: Newton's method found no equilibrium.
     """
     track = steady_track(model, state, _enter(model, state, X), V)
-    problem = _Problem(model, track, V, V_rate)
+    given = _given(model, X, V, V_rate)
+    problem = _Problem(model, track, V, V_rate, given)
     y = problem.solve()
     x, rates, rail_force = problem.split(y[None])
     vertical, lateral, slabs = track.motion(rail_force[0])
@@ -141,14 +145,28 @@ def _enter(model: Model, state: State, X: float) -> float:
     return float(clock[at.FIRST_SEAT_S])
 
 
+def _given(model: Model, X: float, V: float, V_rate: float) -> GivenLoads:
+    """Given loads of the train where it stands; those of the first train if they differ."""
+    g = model.ingredients
+    now = (np.zeros(1), np.array([X + g.centre_s]), np.array([V]), np.array([V_rate]))
+    return g.given_loads(*now) or no_loads(g.train, 1)
+
+
 class _Problem:
     """Residual of steady rolling: train (n), then contact forces on the rails (6 W)."""
 
-    def __init__(self, model: Model, track: Track, V: float, V_rate: float) -> None:
+    def __init__(self, model: Model, track: Track, V: float, V_rate: float, given: GivenLoads) -> None:
         self.model, self.track, self.V = model, track, V
         self.train = model.ingredients.train
         self.pitch = self.train.wheelset_dof[:, 3]
-        self.load = self.train.gravity + V_rate * self.train.acceleration_force
+        self._own_load, self._given = self.train.gravity + V_rate * self.train.acceleration_force, given
+        self._give(1.0)
+
+    def _give(self, share: float) -> None:
+        """Let a share of the given loads act."""
+        given = self._given
+        self.load = self._own_load + share * given.force[0, 0]
+        self.elongation, self.frame_rate = share * given.elongation[0, 0], share * given.frame_rate[0, 0]
 
     def split(self, y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Coordinates (B, n), pitch rates (B, W), forces on the rails (B, W, 2, 3)."""
@@ -171,7 +189,9 @@ class _Problem:
         rail = self.track.under_wheels(force)
         dof = self.train.wheelset_dof
         smooth = np.zeros((1, len(dof), at.N_IRREGULARITY))
-        return evaluate_contact(self.model, self.V, smooth, x[:, dof], v[:, dof], rail)
+        v_wheelsets = v[:, dof]
+        v_wheelsets[..., 4] += self.frame_rate[:, 0]
+        return evaluate_contact(self.model, self.V, smooth, x[:, dof], v_wheelsets, rail)
 
     def residual(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forces out of balance, shape (B, n + 6 W)."""
@@ -180,7 +200,29 @@ class _Problem:
         out = np.broadcast_to(self.load, x.shape) - x @ self.train.K.T
         out = out - self.spread(rates) @ (self.train.C + self.V * self.train.C_speed).T
         out[:, self.train.wheelset_dof] += found.wheelset
+        if self.model.ingredients.given:
+            out += self._beyond_linear(x, rates)
         return np.hstack([out, (found.rail - force).reshape(len(y), -1)])
+
+    def _beyond_linear(self, x: NDArray[np.float64], rates: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces of nonlinear elements beyond their linear part, gyroscopic pair of pitch rates in moving frames."""
+        out = self._suspension(x)
+        spin = self.train.wheelset_spin_inertia * rates
+        out[:, self.train.wheelset_dof[:, 2]] += spin * self.frame_rate[:, 0]
+        out[:, self.train.wheelset_dof[:, 4]] -= spin * self.frame_rate[:, 1]
+        return out
+
+    def _suspension(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces of the nonlinear elements beyond their linear part, the bodies being at rest in their frames."""
+        train, out = self.train, np.zeros_like(x)
+        for e, kind in enumerate(train.element_kind):
+            index, row = train.element_index[e], train.element_row[e]
+            q = np.full(len(x), self.elongation[e]) + (x[:, index] @ row if kind else 0.0)
+            if not q.any():
+                continue
+            deviation = table_force(train.element_table[e], q) - train.element_linear[e] * q
+            np.add.at(out.T, index, -row[:, None] * deviation)
+        return out
 
     def solve(self) -> NDArray[np.float64]:
         """Newton's method, from high friction down to the scenario's where it fails at once; shape (n + 6 W,).
@@ -192,6 +234,8 @@ class _Problem:
         y, size = self._newton(self._guess())
         if size < FORCE_TOLERANCE:
             return y
+        if self.model.ingredients.given and (found := self._approach()) is not None:
+            return found
         reached, y = np.inf, self._guess()
         steps = 1 + max(int(np.ceil(np.log(EASY_FRICTION / wanted) / np.log(FRICTION_RATIO))), 0)
         for friction in np.geomspace(max(EASY_FRICTION, wanted), wanted, steps):
@@ -208,6 +252,26 @@ class _Problem:
             f"numerics.start = 'equilibrium': no steady rolling found at {self.V * 3.6:g} km/h"
             f" (forces out of balance by {size:.3g} N){limit}; use start = 'zero'"
         )
+
+    def _approach(self) -> NDArray[np.float64] | None:
+        """Newton's method from straight track on, the given loads growing by steps that are halved where it fails.
+
+        In a sharp curve the flanges lie against the rails, where the guess, which is made for the treads, is of no use.
+        """
+        self._give(0.0)
+        y, size = self._newton(self._guess())
+        share, step, before = 0.0, FIRST_SHARE, (0.0, y)
+        while size < FORCE_TOLERANCE and share < 1.0 and step > SMALLEST_SHARE:
+            coming = min(share + step, 1.0)
+            self._give(coming)
+            ahead = y if share == 0.0 else y + (coming - share) / (share - before[0]) * (y - before[1])
+            reached, left = self._newton(ahead)
+            if left < FORCE_TOLERANCE:
+                before, share, y, step = (share, y), coming, reached, 2.0 * step
+            else:
+                step *= 0.5
+        self._give(1.0)
+        return y if share == 1.0 else None
 
     def _set_friction(self, friction: float) -> None:
         constants = self.model.constants.copy()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -9,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from tiengine.engine.banded import BandedBlock
+from tiengine.engine.moving_rails import MovingRails
 from tiengine.engine.spline_tables import CarTables, RailTables, SeatTables, SlabTables, Spans
 from tiengine.kernels import spline_layout as at
 from tiengine.model.constant_data import slab_operators
@@ -23,47 +24,19 @@ Matrix: TypeAlias = "sp.csr_array"
 
 
 @dataclass(frozen=True, eq=False)
-class MovingBlock:
-    """A block of a rail by powers of the speed.
-
-    Attributes:
-        M: Mass.
-        flow: C at V = 1 m/s; C is in proportion to V.
-        elastic: K at V = 0.
-        softening: What K loses at V = 1 m/s, in proportion to V^2.
-        stand_in: A_s.
-    """
-
-    M: Matrix
-    flow: Matrix
-    elastic: Matrix
-    softening: Matrix
-    stand_in: Matrix
-
-    @classmethod
-    def of(cls, rest: tuple[Matrix, ...], moving: tuple[Matrix, ...], stand_in: Matrix) -> MovingBlock:
-        """From M, C, K at rest and at 1 m/s."""
-        return cls(rest[0], moving[1], rest[2], sp.csr_array(rest[2] - moving[2]), stand_in)
-
-    def at(self, V: float) -> BandedBlock:
-        """Matrices at a speed [m/s]."""
-        return BandedBlock(self.M, V * self.flow, self.elastic - V**2 * self.softening, self.stand_in)
-
-
-@dataclass(frozen=True, eq=False)
 class ModelTables:
     """All tables of a group of trains.
 
     Attributes:
         model: Constant data.
         spans: Spans of the knots.
-        blocks: Vertical and lateral block of a rail.
+        moving: Blocks of a rail by powers of the speed.
         rails, seats, slabs, cars: Tables of the kernel; those of rails and cars depend on the speed.
     """
 
     model: SplineModel
     spans: Spans
-    blocks: tuple[MovingBlock, MovingBlock]
+    moving: MovingRails
     rails: RailTables
     seats: SeatTables
     slabs: SlabTables
@@ -74,28 +47,24 @@ class ModelTables:
         """Make the tables at the model's speed."""
         g = model.ingredients
         spans = _spans(model.functions.displacement)
-        stand_in = model.seats.smeared
-        blocks = (
-            MovingBlock.of(g.operators.vertical(0.0), g.operators.vertical(1.0), stand_in[0]),
-            MovingBlock.of(g.operators.lateral(0.0), g.operators.lateral(1.0), stand_in[1]),
-        )
+        moving = MovingRails.of(g.operators, model.seats.smeared, g.newmark)
         first = g.designs.matrices[0]
         return cls(
             model=model,
             spans=spans,
-            blocks=blocks,
-            rails=_rails(model, spans, blocks, model.speed),
+            moving=moving,
+            rails=_rails(model, spans, moving, model.speed),
             seats=SeatTables.of(g.seats, g.fastening.length, spans),
             slabs=SlabTables.of(
                 slab_operators(g), first.seat_index, first.seat_w, first.seat_slope, first.seat_x
             ),
-            cars=_cars(model, model.speed),
+            cars=_cars(model, model.speed, coupled_coordinates(g.train)),
         )  # fmt: skip
 
     def factor(self, V: float) -> None:
         """Make the tables that depend on the speed V [m/s] again."""
-        self.rails.refill(_rails(self.model, self.spans, self.blocks, V))
-        self.cars.refill(_cars(self.model, V))
+        self.rails.refill(_rails(self.model, self.spans, self.moving, V))
+        self.cars.refill(_cars(self.model, V, self.cars.car))
 
 
 def _spans(functions: Pieces) -> Spans:
@@ -105,11 +74,10 @@ def _spans(functions: Pieces) -> Spans:
     return Spans(np.hstack([ends, functions.coefficients.reshape(count, -1), functions.first[:, None]]))
 
 
-def _rails(model: SplineModel, spans: Spans, blocks: tuple[MovingBlock, MovingBlock], V: float) -> RailTables:
+def _rails(model: SplineModel, spans: Spans, moving: MovingRails, V: float) -> RailTables:
     """Tables of the rails; the wheels' rows have room for all functions, since their length changes with the speed."""
     g = model.ingredients
-    vertical, lateral = (block.at(V) for block in blocks)
-    made = RailTables.of(vertical, lateral, spans, g.wheel_s, g.newmark.beta_dt2, g.newmark.gamma_dt)
+    made = RailTables.of_factors(*moving.at(V), spans, g.wheel_s)
     W = len(g.wheel_s)
     rows = made.wheel_rows.reshape(W, -1, at.N_WHEEL_FUNCTION)
     room = np.zeros((W, model.functions.count, at.N_WHEEL_FUNCTION))
@@ -117,11 +85,11 @@ def _rails(model: SplineModel, spans: Spans, blocks: tuple[MovingBlock, MovingBl
     return replace(made, wheel_rows=room.ravel())
 
 
-def _cars(model: SplineModel, V: float) -> CarTables:
-    """Tables of the vehicles."""
+def _cars(model: SplineModel, V: float, car: Sequence[NDArray[np.intp]]) -> CarTables:
+    """Tables of the vehicles, whose coordinates are given."""
     train, newmark = model.ingredients.train, model.ingredients.newmark
     return CarTables.of(
-        train.M, train.C + V * train.C_speed, train.K, model.vehicle_load, coupled_coordinates(train),
+        train.M, train.C + V * train.C_speed, train.K, car,
         train.wheelset_dof, train.element_index, newmark.beta_dt2, newmark.gamma_dt,
     )  # fmt: skip
 

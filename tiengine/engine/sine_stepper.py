@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tiengine.engine.bed_pressure import fill_pressures
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.launch import Launch
+from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.scratch import Scratch
 from tiengine.engine.sine_state import SineState
 from tiengine.engine.stepper import Call, Stage, Stepper
@@ -56,6 +57,11 @@ class SineStepper(Stepper):
         self._tick = np.zeros((passes, at.N_TICK), dtype=np.int32)
         self._tick[:, at.PASS] = np.arange(passes)
         self._tick[-1, at.LAST_PASS] = 1
+        n = model.ingredients.train.n
+        self.loads = LoadRows(
+            model.ingredients, model.vehicle_load, np.arange(n, dtype=np.int32), n, 1, len(chunk.clock)
+        )
+        self._tick[:, at.LOAD_STEP], self._tick[:, at.LOAD_TRAIN] = self.loads.step, self.loads.train
         self._launches: list[Launch] = []
         self._parallel, self._public = parallel, public
         self.factored_speed = float("nan")
@@ -173,7 +179,7 @@ class SineStepper(Stepper):
         train, table = self.ingredients.train, self.ingredients.contact.values
         return self._launch(
             kernels.forces_and_contact, tick, _ITERATE if number else _PREDICTED, m.dims, m.constants, chunk.clock,
-            m.stiffness, k.drift, s.seat_scale, k.seat_shape, k.rail_pull, k.slab_pull, m.vehicle_load,
+            m.stiffness, k.drift, s.seat_scale, k.seat_shape, k.rail_pull, k.slab_pull, self.loads.array,
             train.wheelset_dof, m.wheel, train.element_index, train.element_row, train.element_kind,
             train.element_linear, train.element_table, table, chunk.irregularity, m.wheel_shape, b.wheelset_compliance,
             b.rail_coupling, b.rail_answer, b.vehicle_answer, s.motion, s.seat_force, k.slab_force, k.rail_predicted,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.spline_arrays import SplineArrays
 from tiengine.engine.spline_tables import RailTables, SeatTables, SlabTables, Spans
 from tiengine.engine.vector_mode import VectorLaunch
@@ -111,6 +112,7 @@ class SplineStep:
         body_record: Floats,
         slab_record: Floats,
         bed: Bed,
+        loads: LoadRows,
     ):
         """Bind.
 
@@ -132,6 +134,7 @@ class SplineStep:
             slab_record: Displacement, then velocity of every slab coordinate where the bodies are recorded, vectors,
                 shape (B rows groups N 2, 8).
             bed: Bed, read if MORTAR_MODE is not 0.
+            loads: Loads of the cars.
         """
         cars = state.cars
         size = np.zeros(at.N_SIZE, dtype=np.int32)
@@ -139,6 +142,8 @@ class SplineStep:
         size[at.SEATS], size[at.SLAB_DOFS], size[at.PASSES] = len(seats.place), state.slab_dofs, passes
         size[at.GROUPS] = -(-int(dims[layout.SLOTS]) // 8)
         size[at.CARS], size[at.CAR_DOFS], size[at.ELEMENTS] = len(cars.car), cars.dofs, len(suspension.kind)
+        size[at.LOAD_STEP], size[at.LOAD_TRAIN] = loads.step // 8, loads.train // 8
+        car_load = loads.array.reshape(-1, 8)
         self.state, self.size = state, size
         self.job = np.array([0, 1, at.ALL_STAGES], dtype=np.int32)
         self.record = np.full(len(clock), -1, dtype=np.int32)
@@ -148,7 +153,7 @@ class SplineStep:
             state.seat, seats.point, spans.span, seats.place, seats.shape,
             state.slab, state.slab_seat, state.slab_design, slab_record, slabs.coefficient,
             slabs.seat_index, slabs.seat_shape, slabs.seat_x,
-            state.car, cars.columns, cars.load, cars.columns_start, cars.vehicle_place, cars.wheelset_place,
+            state.car, cars.columns, car_load, cars.columns_start, cars.vehicle_place, cars.wheelset_place,
             cars.element_place,
             suspension.row, suspension.kind, suspension.linear, suspension.table,
             state.under, rails.wheel_place, rails.wheel_shape, rails.wheel_rows, contact.wheel, contact.table,
@@ -158,7 +163,7 @@ class SplineStep:
             bed.numbers, np.zeros((3, slabs.dofs)), bed.pressure,
         )  # fmt: skip
         vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, slab_record,
-                   state.car, cars.columns, cars.load)  # fmt: skip
+                   state.car, cars.columns, car_load)  # fmt: skip
         self.launch = VectorLaunch(
             step_kernel,
             (state.lanes, slabs.half_width, cars.blocks),

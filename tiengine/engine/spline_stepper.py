@@ -9,6 +9,7 @@ import numpy as np
 from tiengine.engine.aligned import aligned_zeros
 from tiengine.engine.bed_pressure import fill_pressures
 from tiengine.engine.chunk import Chunk
+from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.spline_state import SplineState
 from tiengine.engine.spline_step import SplineStep, Suspension
 from tiengine.engine.stepper import Plan, Rows, Stage, Stepper
@@ -49,12 +50,15 @@ class SplineStepper(Stepper):
         self.model, train, tables = model, model.ingredients.train, state.tables
         rows = chunk.body.shape[1] * state.held.groups * state.held.slab_dofs * 2
         self._slab_record = aligned_zeros((state.trains * rows, 8))
+        cars = tables.cars
+        width = 8 * cars.blocks * len(cars.car)
+        self.loads = LoadRows(model.ingredients, model.vehicle_load, cars.load_place, width, 8, len(chunk.clock))
         self.launch = SplineStep(
             state.held, model.dims, model.constants, model.ingredients.passes, tables.rails, tables.spans,
             tables.seats, tables.slabs,
             Suspension(train.element_row, train.element_kind, train.element_linear, train.element_table),
             state.wheels, chunk.clock, chunk.irregularity, chunk.wheel, chunk.body,
-            self._slab_record, state.bed,
+            self._slab_record, state.bed, self.loads,
         )  # fmt: skip
         self._compiled = self.launch.launch.compile_seconds
         self.factored_speed = float("nan")

@@ -11,14 +11,17 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from tiengine.engine.aligned import aligned_copy
-from tiengine.engine.banded import BandedBlock, Factors, rail_coefficients, wheel_rows
+from tiengine.engine.banded import BandedBlock, Factors, add_factors, linear_coefficients, wheel_rows
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels.vehicle_columns import DAMPING_COLUMNS, INVERSE_COLUMNS, N_TABLES, STIFFNESS_COLUMNS
 
-__all__ = ["CarTables", "RailTables", "SeatTables", "SlabTables", "Spans", "spans_of"]
+__all__ = ["HALF_WIDTHS", "CarTables", "RailTables", "SeatTables", "SlabTables", "Spans", "spans_of"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+
+HALF_WIDTHS = (7, 11)
+"""Half widths of the bands of the rails' vertical and lateral block."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +109,24 @@ class RailTables:
             gamma_dt: gamma dt [s].
         """
         factors = (
-            Factors.of(vertical.operator(beta_dt2, gamma_dt), 7, vertical.held),
-            Factors.of(lateral.operator(beta_dt2, gamma_dt), 11, lateral.held),
+            Factors.of(vertical.operator(beta_dt2, gamma_dt), HALF_WIDTHS[0], vertical.held),
+            Factors.of(lateral.operator(beta_dt2, gamma_dt), HALF_WIDTHS[1], lateral.held),
         )
+        return cls.of_factors(factors, linear_coefficients(vertical, lateral), spans, wheel_s)
+
+    @classmethod
+    def of_factors(
+        cls, factors: tuple[Factors, Factors], coefficient: Floats, spans: Spans, wheel_s: Floats
+    ) -> RailTables:
+        """Tables from the factors of both blocks and their linear coefficients; the latter are filled up.
+
+        Other arguments as in :meth:`of`.
+        """
         first, shape = spans.at(wheel_s)
         wheels = wheel_rows(factors, first, shape)
+        add_factors(coefficient, factors)
         return cls(
-            coefficient=aligned_copy(rail_coefficients(vertical, lateral, factors).ravel()),
+            coefficient=aligned_copy(coefficient.ravel()),
             wheel_place=wheels.place,
             wheel_rows=wheels.rows.ravel(),
             wheel_shape=shape,
@@ -257,7 +271,7 @@ class CarTables:
         blocks: Vectors of eight in a row of a car.
         columns: -A^-1 K, -A^-1 C, A^-1 of each different car by columns, vectors, shape (vectors, 8).
         columns_start: First vector of each car's tables, shape (cars,).
-        load: Gravity, then force per unit rate of speed, vectors, shape (2 cars blocks, 8).
+        load_place: Places of the train's coordinates in a row of loads, shape (n,).
         vehicle_place: Places of the train's coordinates in row 0 of a train, shape (n,).
         wheelset_place: Places of y, z, roll, pitch, yaw, shape (W, 5).
         element_place: Places of the elements' coordinates, shape (n_e, 12).
@@ -269,7 +283,7 @@ class CarTables:
     blocks: int
     columns: Floats
     columns_start: Ints
-    load: Floats
+    load_place: Ints
     vehicle_place: Ints
     wheelset_place: Ints
     element_place: Ints
@@ -281,7 +295,6 @@ class CarTables:
         M: Floats,
         C: Floats,
         K: Floats,
-        load: Floats,
         car: Sequence[NDArray[np.intp]],
         wheelset_dof: NDArray[np.int32],
         element_index: NDArray[np.int32],
@@ -294,7 +307,6 @@ class CarTables:
             M: Mass of the train, shape (n, n).
             C: Damping at this speed.
             K: Stiffness.
-            load: Gravity, and force per unit rate of speed, shape (2, n).
             car: Coordinates of each car in the train.
             wheelset_dof: y, z, roll, pitch, yaw of each wheelset, shape (W, 5).
             element_index: Coordinates of each nonlinear element, shape (n_e, 12).
@@ -331,9 +343,6 @@ class CarTables:
             if start == len(columns) * table.size // 8:
                 columns.append(table)
             starts.append(start)
-        loads = np.zeros((2, len(car), 8 * blocks))
-        for i, dof in enumerate(car):
-            loads[:, i, : len(dof)] = load[:, dof]
         stride = at.CAR_ROWS * blocks * 8
         place = (number * stride + local).astype(np.int32)
         compliance = np.stack([inverses[number[dof[0]]][np.ix_(local[dof], local[dof])] for dof in wheelset_dof])
@@ -343,7 +352,7 @@ class CarTables:
             blocks=blocks,
             columns=aligned_copy(np.stack(columns).reshape(-1, 8)),
             columns_start=np.array(starts, dtype=np.int32),
-            load=aligned_copy(loads.reshape(-1, 8)),
+            load_place=(number * 8 * blocks + local).astype(np.int32),
             vehicle_place=place,
             wheelset_place=place[wheelset_dof],
             element_place=place[element_index],

@@ -107,6 +107,7 @@ def step_growth(model: Model, V: float, steps: float, lanes: int | None = None) 
         lanes: See :func:`tiengine.engine.kinds.state_at_rest`; by default those of one train.
     """
     lanes = lanes or lanes_for(1)
+    model = replace(model, ingredients=replace(model.ingredients, given=()))  # given loads do not depend on the motion
     count = int(np.clip(SHARE * steps, SHORTEST, LONGEST))
     slab = model.ingredients.designs.matrices[0]
     plates = sp.csr_array(slab.M), sp.csr_array(slab.K_plate + slab.K_bed)

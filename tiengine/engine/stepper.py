@@ -14,11 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from tiengine.engine.chunk import Chunk
+from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.state import State
 from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
 from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Flags, Ints, Reals
+from tiengine.vehicle.given_loads import GivenLoads
 
 __all__ = ["BETWEEN_STEPS", "Due", "Plan", "Rows", "Stage", "Stepper", "always"]
 
@@ -76,10 +78,12 @@ class Stepper(ABC):
         moves: Whether seats, slabs or speed change at each loaded step, shape (steps,).
         stages: Own stages of one step, in their order.
         watchers: Stages after them, see :meth:`watch`.
+        loads: Loads of the cars in the kernels' layout.
         factored_speed: Speed for which the matrices that depend on it were made [m/s].
     """
 
     factored_speed: float
+    loads: LoadRows
 
     def __init__(self, ingredients: Ingredients, state: State, chunk: Chunk) -> None:
         """Keep the data of every kind of step; a derived class calls :meth:`bind` once its stages can be made."""
@@ -150,7 +154,7 @@ class Stepper(ABC):
         """
         self._mark = mark
 
-    def load(self, X: Reals, V: Reals, V_rate: Reals, irregularity: Reals) -> None:
+    def load(self, X: Reals, V: Reals, V_rate: Reals, irregularity: Reals, given: GivenLoads | None = None) -> None:
         """Fill the chunk for the coming steps.
 
         Args:
@@ -158,10 +162,13 @@ class Stepper(ABC):
             V: Speed [m/s].
             V_rate: Its rate [m/s^2].
             irregularity: Track channels, shape (B, steps, W, N_IRREGULARITY).
+            given: Loads of the train beyond gravity; None where it has none.
         """
         clock = window_clock(self.ingredients.slab, X, V, V_rate, self.ingredients.seat_reach)
         self.chunk.clock[: len(X)] = clock
         self.chunk.irregularity[:, : len(X)] = irregularity
+        if given is not None:
+            self.loads.fill(given, len(X))
         changes = np.diff(clock[:, [at.FIRST_SEAT, at.FIRST_SLAB, at.SPEED]], axis=0).any(axis=1)
         self.moves = np.concatenate([[True], changes])
 

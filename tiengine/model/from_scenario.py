@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table_cache import contact_table
+from tiengine.model.curve_loads import CurveLoads
 from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.model.newmark import Newmark
 from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.defects import fastening_factors
 from tiengine.track.slab_matrices import slab_designs
-from tiengine.vehicle.train import assemble
+from tiengine.vehicle.given_loads import LoadSource
+from tiengine.vehicle.train import TrainModel, assemble
 
 __all__ = ["ingredients"]
 
@@ -32,6 +35,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
     parts, numerics = scenario.parts, scenario.numerics
     asked = scenario.train
     train = assemble(parts.vehicles, parts.centres, series_springs=asked.series_springs or None, effort=asked.effort)
+    if scenario.track.line is not None:
+        train = replace(train, K=train.K + train.K_leaning)
     return Ingredients(
         rail=parts.rail,
         fastening=parts.fastening,
@@ -52,7 +57,14 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         local_compliance=numerics.truncation == "local",
         absorbing_zone=numerics.absorbing_zone,
         explicit_mortar=numerics.mortar == "explicit",
+        given=_given(scenario, train),
     )
+
+
+def _given(scenario: Scenario, train: TrainModel) -> tuple[LoadSource, ...]:
+    """Given loads of the train: those of a line that is not straight and level."""
+    line = scenario.track.line
+    return () if line is None else (CurveLoads(line, train),)
 
 
 def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64]]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
 from tiengine.model.newmark import Newmark
+from tiengine.parameters.arrays import Reals
 from tiengine.track.fastening import Fastening, seat_count
 from tiengine.track.knots import Grading, graded_knots
 from tiengine.track.mortar import Mortar
@@ -20,6 +21,7 @@ from tiengine.track.sines import Sines
 from tiengine.track.slab import Slab
 from tiengine.track.slab_matrices import SlabMatrices
 from tiengine.track.splines import Splines
+from tiengine.vehicle.given_loads import GivenLoads, LoadSource, sum_of_loads
 from tiengine.vehicle.train import TrainModel, centre_in_window
 
 __all__ = ["Ingredients", "SlabDesigns"]
@@ -65,6 +67,7 @@ class Ingredients:
         local_compliance: Add the static compliance that the trial functions lack under the wheels.
         absorbing_zone: Length of the zones at the window's ends with additional springs to the ground [m]; 0 for none.
         trains: Trains advanced together.
+        given: What makes given loads of the train, beyond gravity.
     """
 
     rail: Rail
@@ -87,6 +90,16 @@ class Ingredients:
     local_compliance: bool = False
     absorbing_zone: float = 0.0
     trains: int = 1
+    given: tuple[LoadSource, ...] = ()
+
+    @property
+    def load_sets(self) -> int:
+        """Sets of given loads: 0 if there are none, 1 if all trains have the same, else one for each train."""
+        return max((source.sets for source in self.given), default=0)
+
+    def given_loads(self, time: Reals, x: Reals, V: Reals, V_rate: Reals) -> GivenLoads | None:
+        """Sum of the given loads, None if there are none; arguments as in :class:`LoadSource`."""
+        return sum_of_loads(self.given, self.train, time, x, V, V_rate) if self.given else None
 
     @property
     def slots(self) -> int:

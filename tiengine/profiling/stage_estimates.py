@@ -51,7 +51,7 @@ def suspension_us(stepper: SineStepper) -> float:
         many = np.tile(motion, trains)
         return lambda: suspension_forces(
             train.n, train.element_index, train.element_row, train.element_kind, train.element_linear,
-            train.element_table, many,
+            train.element_table, np.zeros(len(train.element_kind)), many,
         )  # fmt: skip
 
     return _by_difference(evaluate, TRAIN_COPIES)

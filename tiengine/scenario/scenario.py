@@ -30,6 +30,7 @@ from tiengine.scenario.gauges import Gauge, check_gauges
 from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
+from tiengine.track.alignment_file import read_alignment
 from tiengine.track.defects import check_defects
 from tiengine.track.knots import graded_knots
 from tiengine.track.seat_points import seat_points
@@ -45,6 +46,7 @@ LONGEST_RUN = 1e6  # s: the longest distance at 1 m/s
 LONGEST_WINDOW = 2000.0  # m
 MOST_MODES = 3000  # sines of each rail field: the matrices of a rail then take 2 GB
 MOST_KNOTS = 20_000
+STEEPEST_TILT = 0.3  # unbalanced lateral acceleration over g: trains tip over beyond 0.4
 MOST_SPANS_OF_SEAT = 3  # that the points of a seat may reach over: a seat then touches seven splines
 
 
@@ -137,7 +139,7 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
         path = find_preset("scenarios", str(source), called="scenario")
         folder, tables = path.parent, load_toml(path)
         tables.setdefault("name", path.stem)
-    tables = _absolute(apply_overrides(tables, overrides, Scenario), folder)
+    tables = _with_alignment(_absolute(apply_overrides(tables, overrides, Scenario), folder), folder)
     scenario = build(Scenario, tables)
     ensemble = _absolute_vary(scenario.ensemble, folder)
     presets = collect_presets(scenario.train, scenario.track, scenario.presets, folder)
@@ -225,6 +227,19 @@ def _absolute(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
     return {**tables, "irregularity": {**irregularity, "file": str(path)}}
 
 
+def _with_alignment(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+    """The tables with the rows of an alignment file in the place of its name."""
+    track = tables.get("track")
+    if not isinstance(track, dict) or not isinstance(track.get("alignment_file"), str):
+        return tables
+    name = track["alignment_file"]
+    if track.get("alignment_rows") or track.get("alignment"):
+        raise InputError(f"track.alignment_file = {name!r}: must not be set together with another alignment")
+    rows = read_alignment(user_path(name, folder, "track.alignment_file"), f"track.alignment_file = {name!r}")
+    kept = {key: value for key, value in track.items() if key != "alignment_file"}
+    return {**tables, "track": {**kept, "alignment_rows": rows}}
+
+
 def to_toml(scenario: Scenario) -> str:
     """Write the resolved scenario as TOML: every default and every preset used; it loads back equal.
 
@@ -251,7 +266,7 @@ def _check(scenario: Scenario) -> None:
             f" must be at most {LONGEST_RUN:g} s"
         )
     begin = scenario.rear + scenario.centre_in_window
-    adhesion = scenario.train.speed.largest_acceleration(begin, begin + scenario.train.distance) / GRAVITY
+    adhesion = _largest_effort(scenario, begin) / GRAVITY
     if scenario.train.effort == "wheels" and adhesion >= scenario.track.friction:
         raise InputError(
             f"train.speed_kmh: needs an adhesion of {adhesion:.3g}; must be below track.friction ="
@@ -271,6 +286,7 @@ def _check(scenario: Scenario) -> None:
     step = scenario.numerics.time_step
     if step != "auto":
         check_wavelength(scenario, float(step))
+    _check_alignment(scenario, begin)
     check_defects(
         scenario.track.failed_fastenings,
         scenario.track.mortar_voids,
@@ -282,10 +298,45 @@ def _check(scenario: Scenario) -> None:
     )
 
 
+def _largest_effort(scenario: Scenario, begin: float) -> float:
+    """Largest force on the train per unit mass that its wheels brake or drive with [m/s^2]; an upper bound."""
+    end = begin + scenario.train.distance
+    effort, line = scenario.train.speed.largest_acceleration(begin, end), scenario.track.line
+    if line is None:
+        return effort
+    rear = begin + float(scenario.parts.wheelset_positions.min())
+    places = np.concatenate([[rear, end], line.x[(line.x > rear) & (line.x < end)]])
+    return effort + GRAVITY * float(np.abs(line.lines[2](places)).max())
+
+
+def _check_alignment(scenario: Scenario, begin: float) -> None:
+    """Check that the line is read and that the tilted train stays on it."""
+    track, line = scenario.track, scenario.track.line
+    if track.alignment_file is not None or "track.alignment_file" in scenario.ensemble.vary:
+        raise InputError("track.alignment_file: must be the same for all trains; give track.alignment_rows instead")
+    if line is None:
+        return
+    end = begin + scenario.train.distance
+    x = np.linspace(begin, end, 400)
+    V = np.array([scenario.train.speed.at(float(here))[0] for here in x])
+    tilt = np.abs(line.lateral_acceleration(x, V, GRAVITY))
+    if tilt.max() > STEEPEST_TILT * GRAVITY:
+        i = int(np.argmax(tilt))
+        raise InputError(
+            f"train.speed_kmh: {3.6 * V[i]:.4g} km/h at chainage {x[i]:.5g} m give an unbalanced acceleration of"
+            f" {tilt[i]:.3g} m/s^2; must be at most {STEEPEST_TILT * GRAVITY:.3g} m/s^2 in a curve (track.alignment)"
+        )
+
+
 def _check_trial_functions(scenario: Scenario) -> None:
     """Check how many trial functions describe a rail, and that seats do not reach over too many of them."""
     window, numerics = scenario.window_length, scenario.numerics
     sines = numerics.trial_functions == "sines"
+    if numerics.threads > 1 and not sines:
+        raise InputError(
+            f"numerics.threads = {numerics.threads}: must be 1 with splines, whose step has one thread; several trains"
+            " share the cores by worker processes (--workers)"
+        )
     most, fewer = (MOST_MODES, "numerics.modes_per_metre") if sines else (MOST_KNOTS, "density of numerics.knots")
     count = numerics.modes(window) if sines else int(window / numerics.knots.finest)
     if window > LONGEST_WINDOW or count > most:

@@ -14,6 +14,9 @@ from tiengine.parameters.quantity import Params, Q
 from tiengine.result_files.channels import BODY, IRREGULARITY, WHEEL
 from tiengine.scenario.key_checks import channel_names, check_speed, number_or
 from tiengine.scenario.part import Part
+from tiengine.track.alignment import Alignment
+from tiengine.track.alignment_elements import AlignmentElement, AlignmentRows, alignment_of
+from tiengine.track.alignment_file import MOST_ROWS
 from tiengine.track.defects import FailedFastenings
 from tiengine.track.knots import Grading
 from tiengine.track.mortar import MortarVoid
@@ -97,6 +100,25 @@ class Track(Params):
         0.016
     )
     cant: Annotated[float, Q("-", "inward inclination of the rail", ge=0, le=0.1)] = 0.025
+    alignment: Annotated[
+        tuple[AlignmentElement, ...],
+        Field(description="tables, see below; straight and level without them", max_length=MOST_DEFECTS),
+    ] = ()
+    alignment_file: Annotated[
+        str | None,
+        Field(description="the line as CSV (docs/files.md), relative to the scenario; read once", max_length=4096),
+    ] = None
+    alignment_rows: Annotated[
+        AlignmentRows,
+        Field(
+            description="the line as rows [chainage in m, curvature in 1/m, cant in mm, gradient in permille], linear"
+            " between them; made from alignment_file",
+            max_length=MOST_ROWS,
+        ),
+    ] = ()
+    alignment_rounding: Annotated[
+        float, Q("m", "length over which the ends of transitions and vertical curves are rounded", ge=1, le=100)
+    ] = 10.0
     mortar_no_tension: Annotated[
         bool, Field(description="the bed transmits no tension; the slab's dead weight counts as pressure")
     ] = False
@@ -106,6 +128,19 @@ class Track(Params):
     mortar_voids: Annotated[
         tuple[MortarVoid, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
+
+    @property
+    def line(self) -> Alignment | None:
+        """Curvature, cant and gradient over chainage; None if there are none."""
+        return _line(self.alignment, self.alignment_rows, self.alignment_rounding)
+
+
+@lru_cache(maxsize=16)
+def _line(
+    elements: tuple[AlignmentElement, ...], rows: tuple[tuple[float, float, float, float], ...], rounding: float
+) -> Alignment | None:
+    """Line once per value; ``Track.line`` is read many times."""
+    return alignment_of(elements, rows, rounding)
 
 
 class Contact(Params):
@@ -176,7 +211,7 @@ class Numerics(Params):
         Literal["cover", "paper"], Field(description="slabs under the whole window, or the source paper's count")
     ] = "cover"
     threads: Annotated[
-        int, Q("-", "threads of Taichi's loop over trains, with sines; all else uses one", ge=1, le=1024)
+        int, Q("-", "threads of Taichi's loop over trains; 1 with splines", ge=1, le=1024)
     ] = 1
 
     def modes(self, window: float) -> int:

@@ -224,10 +224,8 @@ def _groups(scenario: Scenario) -> dict[str, GroupSpec]:
 
 
 def _workers(scenario: Scenario) -> int:
-    """Processes: one per core, divided by the threads of each; splines use one thread."""
-    numerics = scenario.numerics
-    threads = numerics.threads if numerics.trial_functions == "sines" else 1
-    return max(cores() // threads, 1)
+    """Processes: one per core, divided by the threads of each."""
+    return max(cores() // scenario.numerics.threads, 1)
 
 
 def cores() -> int:

@@ -188,7 +188,9 @@ class Run:
         wheels = x[:, None] + ingredients.train.wheelset_x
         irregularity = np.stack([track.sample(wheels) for track in self.tracks])
         self.timer.lap("irregularity")
-        self.stepper.load(x - ingredients.centre_s, V, V_rate, irregularity)
+        time = ingredients.newmark.dt * np.arange(self.done + 1.0, self.done + count + 1.0)
+        given = ingredients.given_loads(time, x, V, V_rate)
+        self.stepper.load(x - ingredients.centre_s, V, V_rate, irregularity, given)
         self.guard.load(self.done, x)
         self.position = float(x[-1])
         self.timer.lap("window and seats")

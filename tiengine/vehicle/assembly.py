@@ -32,9 +32,10 @@ from numpy.typing import NDArray
 
 from tiengine.parameters.errors import InputError
 from tiengine.vehicle.connector import Body, Damper, Direction, Joint, Spring, end_motion
+from tiengine.vehicle.preload import LoadedSpring
 from tiengine.vehicle.vehicle import Vehicle
 
-__all__ = ["Assembly", "Effort", "Element", "PlacedBody", "longitudinal_push", "spin_push"]
+__all__ = ["Assembly", "Effort", "Element", "PlacedBody", "grade_push", "longitudinal_push", "spin_push"]
 
 _AXES: dict[Direction, int] = {"x": 0, "y": 1, "z": 2}
 _FORCE_OF_RATE, _FORCE_OF_ELONGATION = 0, 1
@@ -77,6 +78,7 @@ class Assembly:
         K: Stiffness, likewise.
         K_push: Stiffness of the longitudinal springs with both ends at their middle height, likewise.
         elements: Nonlinear elements.
+        springs: Springs, for what a leaning train adds.
     """
 
     def __init__(self, bodies: Sequence[PlacedBody], internal: int) -> None:
@@ -91,6 +93,7 @@ class Assembly:
         self.size = self.first_internal + internal
         self.M, self.C, self.K, self.K_push = (np.zeros((self.size, self.size)) for _ in range(4))
         self.elements: list[Element] = []
+        self.springs: list[LoadedSpring] = []
         for i, (_, _, _, body) in enumerate(bodies):
             own = np.arange(6 * i, 6 * i + 6)
             self.M[own, own] = (body.mass, body.mass, body.mass, body.Jx, body.Jy, body.Jz)
@@ -109,8 +112,11 @@ class Assembly:
             columns, B = self._elongation(spring, index)
             self.K[np.ix_(columns, columns)] += B.T * spring.stiffness @ B
             self.C[np.ix_(columns, columns)] += B.T * spring.damping @ B
-            _, B = self._elongation(_levelled(spring), index)
-            _add(self.K_push, columns, B[0], spring.kx)
+            _, level = self._elongation(_levelled(spring), index)
+            _add(self.K_push, columns, level[0], spring.kx)
+            ends = ((spring.a, spring.point_a), (spring.b, spring.point_b))
+            Z_a, Z_b = (self.bodies[index[name]].body.local(point)[2] for name, point in ends)
+            self.springs.append(LoadedSpring(columns, B, level[1], (Z_a, Z_b), spring.ky, spring.kz))
         for damper in vehicle.damper:
             columns, B = self._elongation(damper, index)
             self._add_damper(damper, prefix, columns, B[_AXES[damper.direction]], series)
@@ -181,17 +187,56 @@ def longitudinal_push(full: Assembly) -> NDArray[np.float64]:
     Raises:
         InputError: No longitudinal spring transmits the inertia of a body to the wheelsets.
     """
+    sprung, mass = _sprung(full)
+    return _pushed(full, sprung, mass[:, None])[:, 0]
+
+
+def _sprung(full: Assembly) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Longitudinal motions of the bodies that are not wheelsets, and their masses."""
     sprung = np.array([6 * i for i, placed in enumerate(full.bodies) if not placed.body.wheelset], dtype=np.intp)
-    mass = np.diag(full.M)[sprung]
+    return sprung, np.diag(full.M)[sprung]
+
+
+def _pushed(full: Assembly, sprung: NDArray[np.intp], mass: NDArray[np.float64]) -> NDArray[np.float64]:
+    """K_ux K_xx^-1 m for several columns m, shape (size, columns)."""
     K_xx = full.K_push[np.ix_(sprung, sprung)]
     x = np.linalg.lstsq(K_xx, mass, rcond=None)[0] if len(sprung) else mass
-    residual = np.abs(K_xx @ x - mass)
+    residual = np.abs(K_xx @ x - mass).max(axis=1, initial=0.0)
     if (residual > 1e-6 * mass.max(initial=0.0)).any():
         name = full.bodies[sprung[np.argmax(residual)] // 6].name
         raise InputError(f"{name}: no longitudinal spring (kx) transmits its inertia to the wheelsets")
     push = full.K_push[:, sprung] @ x
     push[0 : full.first_internal : 6] = 0.0
     return np.asarray(push, dtype=np.float64)
+
+
+def grade_push(full: Assembly, vehicles: Sequence[Vehicle], effort: str) -> NDArray[np.float64]:
+    """Compute the force of gravity along the track on every motion per unit g sin(gradient) at each body.
+
+    It acts as the inertia of a growing speed does, except on the wheelsets' spin: bodies push the coordinates through
+    their longitudinal springs; with the effort at the wheels every wheelset of a vehicle gets its share of the torque
+    that holds the speed.
+
+    Args:
+        full: The train.
+        vehicles: Its vehicles.
+        effort: ``"axles"`` or ``"wheels"``.
+
+    Returns:
+        Generalised forces [kg, kg m], shape (size, bodies).
+    """
+    push = np.zeros((full.size, len(full.bodies)))
+    sprung, mass = _sprung(full)
+    push[:, sprung // 6] = _pushed(full, sprung, np.diag(mass))
+    if effort == "wheels":
+        for i, (_, k, _, body) in enumerate(full.bodies):
+            if not body.wheelset:
+                continue
+            own = np.array([other.body.mass if other.vehicle == k else 0.0 for other in full.bodies])
+            torque = own / len(vehicles[k].axle_positions) * vehicles[k].wheel_radius
+            push[6 * i + 4] -= torque
+            push[4 : full.first_internal : 6] += np.outer(_guides(full, i), torque)
+    return push
 
 
 def spin_push(full: Assembly, vehicles: Sequence[Vehicle], effort: str) -> NDArray[np.float64]:

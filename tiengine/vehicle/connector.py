@@ -34,6 +34,7 @@ __all__ = [
     "check_stop",
     "end_motion",
     "extend_table",
+    "table_force",
 ]
 
 Length = Annotated[float, Q("m")]
@@ -231,6 +232,18 @@ def extend_table(table: NDArray[np.float64], points: int) -> NDArray[np.float64]
     step = table[-1] - table[-2]
     count = np.arange(1, points - len(table) + 1)[:, None]
     return np.vstack([table, table[-1] + count * step])
+
+
+def table_force(table: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Odd force by a table of points, its last slope going on.
+
+    Args:
+        table: Points (abscissa, force), shape (n, 2).
+        q: Abscissas [m, m/s].
+    """
+    size = np.abs(q)
+    beyond = (table[-1, 1] - table[-2, 1]) / (table[-1, 0] - table[-2, 0]) * np.maximum(size - table[-1, 0], 0.0)
+    return np.asarray(np.sign(q) * (np.interp(size, table[:, 0], table[:, 1]) + beyond), np.float64)
 
 
 def end_motion(body: Body, point: Point) -> NDArray[np.float64]:

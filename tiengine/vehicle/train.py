@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
-from tiengine.vehicle.assembly import Assembly, Effort, Element, PlacedBody, longitudinal_push, spin_push
+from tiengine.vehicle.assembly import Assembly, Effort, Element, PlacedBody, grade_push, longitudinal_push, spin_push
 from tiengine.vehicle.connector import extend_table
+from tiengine.vehicle.preload import leaning_stiffness
 from tiengine.vehicle.vehicle import Vehicle
 
 __all__ = [
@@ -66,6 +67,12 @@ class TrainModel:
         wheelset_mass: Mass [kg], shape (n_ws,).
         wheelset_spin_inertia: J about the axle [kg m^2], shape (n_ws,).
         body_names: Unique in the train, in the order of the coordinates.
+        body_x: Centre of gravity relative to the first vehicle's centre, forward [m], shape (bodies,).
+        body_height: Centre of gravity above the rails [m], shape (bodies,).
+        body_vehicle_x: Centre of each body's vehicle relative to the first's, forward [m], shape (bodies,).
+        body_inertia: Roll, pitch and yaw inertia [kg m^2], shape (bodies, 3).
+        K_leaning: Change of K where the train leans, in curves, shape (n, n) (:mod:`tiengine.vehicle.preload`).
+        grade_force: Generalised force per unit g sin(gradient) at each body, shape (n, bodies).
         element_index: Coordinates of each nonlinear element, unused 0, shape (n_e, 12).
         element_row: Elongation = row . u, unused 0, shape (n_e, 12).
         element_kind: 0 force of the rate, 1 force of the elongation, shape (n_e,).
@@ -90,6 +97,12 @@ class TrainModel:
     wheelset_mass: NDArray[np.float64]
     wheelset_spin_inertia: NDArray[np.float64]
     body_names: tuple[str, ...]
+    body_x: NDArray[np.float64]
+    body_height: NDArray[np.float64]
+    body_vehicle_x: NDArray[np.float64]
+    body_inertia: NDArray[np.float64]
+    K_leaning: NDArray[np.float64]
+    grade_force: NDArray[np.float64]
     element_index: NDArray[np.int32]
     element_row: NDArray[np.float64]
     element_kind: NDArray[np.int32]
@@ -153,7 +166,7 @@ def assemble(
         full.add_vehicle(vehicle, first, series[k], prefix)
         first += len(vehicle.body)
     push = longitudinal_push(full) + spin_push(full, vehicles, effort)
-    return _reduce(full, vehicles, push)
+    return _reduce(full, vehicles, centres, push, grade_push(full, vehicles, effort))
 
 
 def _check_centres(vehicles: Sequence[Vehicle], centres: NDArray[np.float64]) -> None:
@@ -180,7 +193,13 @@ def _place(vehicles: Sequence[Vehicle], centres: NDArray[np.float64]) -> list[Pl
     return placed
 
 
-def _reduce(full: Assembly, vehicles: Sequence[Vehicle], push: NDArray[np.float64]) -> TrainModel:
+def _reduce(
+    full: Assembly,
+    vehicles: Sequence[Vehicle],
+    centres: NDArray[np.float64],
+    push: NDArray[np.float64],
+    grade: NDArray[np.float64],
+) -> TrainModel:
     """Eliminate the longitudinal motions and arrange the data for the engine."""
     bodies = full.bodies
     keep = np.array([i for i in range(full.size) if i >= full.first_internal or i % 6])
@@ -212,6 +231,12 @@ def _reduce(full: Assembly, vehicles: Sequence[Vehicle], push: NDArray[np.float6
         wheelset_mass=np.array([bodies[i].body.mass for i in order]),
         wheelset_spin_inertia=spin,
         body_names=tuple(placed.name for placed in bodies),
+        body_x=np.array([placed.x for placed in bodies]),
+        body_height=np.array([placed.body.height for placed in bodies]),
+        body_vehicle_x=np.array([centres[placed.vehicle] for placed in bodies]),
+        body_inertia=np.array([(placed.body.Jx, placed.body.Jy, placed.body.Jz) for placed in bodies]),
+        K_leaning=_leaning(full, keep, dofs),
+        grade_force=grade[keep],
         element_index=index,
         element_row=row,
         element_kind=np.array([element.kind for element in full.elements], dtype=np.int32),
@@ -219,6 +244,16 @@ def _reduce(full: Assembly, vehicles: Sequence[Vehicle], push: NDArray[np.float6
         element_table=table,
         element_names=tuple(element.name for element in full.elements),
     )
+
+
+def _leaning(full: Assembly, keep: NDArray[np.intp], wheelset_dof: NDArray[np.int32]) -> NDArray[np.float64]:
+    """K_leaning, with the preloads of the springs over held wheelsets."""
+    K, weight = full.K[np.ix_(keep, keep)], np.zeros(full.size)
+    weight[2 : full.first_internal : 6] = GRAVITY * np.diag(full.M)[2 : full.first_internal : 6]
+    free = np.setdiff1d(np.arange(len(keep)), wheelset_dof.ravel())
+    u = np.zeros(full.size)
+    u[keep[free]] = np.linalg.lstsq(K[np.ix_(free, free)], weight[keep[free]], rcond=None)[0]
+    return leaning_stiffness(full.springs, u)[np.ix_(keep, keep)]
 
 
 def _gyroscopic(n: int, wheelset_dof: NDArray[np.int32], momentum: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -117,6 +117,8 @@ def _wheelset(given: Ingredients) -> TrainModel:
         wheelset_vehicle=np.zeros(1, dtype=np.int32), wheel_radius=given.train.wheel_radius[0] * one,
         half_spacing=given.train.half_spacing[0] * one, wheelset_mass=2.0 * LOAD / 9.81 * one,
         wheelset_spin_inertia=np.zeros(1), body_names=("wheelset",),
+        body_x=np.zeros(1), body_height=np.zeros(1), body_vehicle_x=np.zeros(1), body_inertia=np.zeros((1, 3)),
+        K_leaning=none, grade_force=np.zeros((5, 1)),
         element_index=np.zeros((0, 12), dtype=np.int32), element_row=np.zeros((0, 12)),
         element_kind=np.zeros(0, dtype=np.int32), element_linear=np.zeros(0), element_table=np.zeros((0, 2, 2)),
         element_names=(),

@@ -154,7 +154,7 @@ class SemiDiscrete:
         motion = np.stack([u, v, train.gravity])
         suspension_forces(
             train.n, train.element_index, train.element_row, train.element_kind, train.element_linear,
-            train.element_table, motion,
+            train.element_table, np.zeros(len(train.element_kind)), motion,
         )  # fmt: skip
         roll, pitch, yaw = train.wheelset_dof[:, 2:].T
         motion[2, roll] += train.wheelset_spin_inertia * v[pitch] * v[yaw]

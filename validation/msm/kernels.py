@@ -268,7 +268,7 @@ def explicit_forces(
     K: Reals2,
     C: Reals2,
     C_speed: Reals2,
-    vehicle_load: Reals2,
+    vehicle_load: Reals1,
     wheelset_dof: Ints2,
     wheel: Reals2,
     element_index: Ints2,
@@ -289,12 +289,17 @@ def explicit_forces(
             predict_rails(constants, numbers, stiffness, rails)
             predict_vehicle(constants, numbers, speed, K, C, C_speed, motion)
         fold(numbers, target, sign, rails, folded_out)
-        engine.vehicle_forces(0, clock[step, at.SPEED_RATE], at.V, dims, vehicle_load, wheelset_dof, wheel, motion)
+        n = motion.shape[1]
+        engine.vehicle_forces(
+            0, clock[step, at.SPEED_RATE], at.V, n, element_kind.shape[0], dims, vehicle_load, wheelset_dof, wheel,
+            motion,
+        )  # fmt: skip
         for i in range(motion.shape[1]):
             motion[at.F, i] = motion[at.F, i] + motion[at.LINEAR, i]
         suspension.add_suspension_forces(
-            0, element_index, element_row, element_kind, element_linear, element_table, motion, at.U, at.V, at.F
-        )
+            0, element_index, element_row, element_kind, element_linear, element_table, motion, at.U, at.V, at.F,
+            vehicle_load, 2 * n,
+        )  # fmt: skip
 
 
 @ti.kernel

@@ -86,7 +86,7 @@ class FullTrack:
         seat: Seat rows of the sound slab as factors of one product: [w, dw/dy] by side, shape (4, m, seats).
         numbers, dims, constants: For the kernels.
         wheel: r0, b0, spin inertia, shape (W, 3).
-        vehicle_load: Gravity, and force per unit rate of speed, shape (2, n).
+        vehicle_load: Force per unit rate of speed, gravity, then zeros: no given loads, shape (2 n + n_e + 2 W,).
         train, contact: Shared with the engine.
         rail, fastening, mortar: Parameters.
         dead_pressure: Weight of a slab on its bed [Pa].
@@ -196,7 +196,7 @@ def build_track(
         dims=_dims(given),
         constants=_constants(given, _missing(given.rail, L, modes)),
         wheel=np.stack([given.train.wheel_radius, given.train.half_spacing, given.train.wheelset_spin_inertia], axis=1),
-        vehicle_load=np.stack([given.train.gravity, given.train.acceleration_force]),
+        vehicle_load=_loads(given.train),
         train=given.train,
         contact=given.contact,
         rail=given.rail,
@@ -206,6 +206,12 @@ def build_track(
         newmark=given.newmark,
         passes=given.passes,
     )
+
+
+def _loads(train: TrainModel) -> Reals:
+    """Loads of the vehicle in the order of ``tiengine.engine.load_rows``."""
+    nothing = np.zeros(len(train.element_kind) + 2 * len(train.wheelset_x))
+    return np.concatenate([train.acceleration_force, train.gravity, nothing])
 
 
 def _largest_prime(n: int) -> int:
