@@ -30,7 +30,7 @@ result
 result.plot("forces")
 
 # %%
-result.plot("spectrum")
+result.plot("contact")
 
 # %% [markdown]
 # Channels are arrays with units and coordinates.

@@ -40,7 +40,7 @@ SHORTER = {
     "which_parameter": {
         '"train.distance" = 30.0': '"train.distance" = 3.0',
         '"output.run_in" = 5.0': '"output.run_in" = 0.5',
-        "size = 16 ": "size = 2 ",
+        'method = "saltelli"\nsize = 16 ': 'method = "latin_hypercube"\nsize = 2 ',
         "-o matters": "-o matters --workers 1",
     },
     "full_length": {"train.distance=15": "train.distance=4"},
