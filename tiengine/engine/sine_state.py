@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
 from tiengine.kernels import layout as at
-from tiengine.kernels.wheel_rail import COS, N_CONTACT, SHIFT
+from tiengine.kernels.wheel_rail import COS, N_CONTACT, SHIFT, TILT
 from tiengine.model.sine_model import SineModel
 from tiengine.parameters.arrays import Reals
 
@@ -108,6 +108,11 @@ class SineState(State):
     def relative_shift(self) -> Reals:
         """Outward shift of every wheel against its rail [m], shape (B, W, 2)."""
         return self.contact[..., :2, SHIFT]
+
+    @property
+    def relative_tilt(self) -> Reals:
+        """Outward tilt of every wheel against its rail [rad], shape (B, W, 2)."""
+        return self.contact[..., TILT]
 
     @property
     def seat_forces(self) -> Reals:

@@ -22,7 +22,7 @@ from tiengine.kernels import layout
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels import spline_seats as seats
 from tiengine.kernels.spline_squares import squares_kernel
-from tiengine.kernels.wheel_rail import COS, N_CONTACT, SHIFT
+from tiengine.kernels.wheel_rail import COS, N_CONTACT, SHIFT, TILT
 from tiengine.model.spline_model import SplineModel
 from tiengine.parameters.arrays import Reals
 
@@ -109,6 +109,11 @@ class SplineState(State):
     def relative_shift(self) -> Reals:
         """Outward shift of every wheel against its rail [m], shape (B, W, 2)."""
         return self.wheels.contact[..., :2, SHIFT]
+
+    @property
+    def relative_tilt(self) -> Reals:
+        """Outward tilt of every wheel against its rail [rad], shape (B, W, 2)."""
+        return self.wheels.contact[..., TILT]
 
     @property
     def seat_forces(self) -> Reals:

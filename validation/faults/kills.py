@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -104,17 +105,18 @@ class Yard:
         folder.mkdir()
         return folder
 
-    def start(self, folder: Path, how: str = "copy", *extra: str) -> Process:
-        """Start the run."""
-        return LAUNCH[how](folder, "run", [*self.run.arguments, "-o", NAME, *extra])
+    def start(self, folder: Path, how: str = "copy", *extra: str, event: int = 0) -> Process:
+        """Start the run; a copy may stand still at an event of its writer."""
+        return _launch(how, event)(folder, "run", [*self.run.arguments, "-o", NAME, *extra])
 
-    def resume(self, folder: Path, how: str = "copy") -> Process:
+    def resume(self, folder: Path, how: str = "copy", event: int = 0) -> Process:
         """Start to resume it."""
-        return LAUNCH[how](folder, "resume", ["resume", NAME, *self.run.effort])
+        return _launch(how, event)(folder, "resume", ["resume", NAME, *self.run.effort])
 
-    def go_on(self, folder: Path, how: str = "copy") -> Process:
+    def go_on(self, folder: Path, how: str = "copy", event: int = 0) -> Process:
         """Resume, or start again if there is no file yet."""
-        return self.resume(folder, how) if (folder / NAME).exists() else self.start(folder, how)
+        start = self.resume if (folder / NAME).exists() else self.start
+        return start(folder, how, event=event)
 
     def clear(self, folder: Path) -> None:
         """Remove a folder and its logs."""
@@ -143,7 +145,7 @@ class Yard:
         for attempt in range(TRIES):
             folder = self.place()
             outcome = Outcome(kill)
-            process = self.start(folder, kill.start)
+            process = self.start(folder, kill.start, event=kill.event)
             if self._kill(process, kill.moment, kill.part * 0.7**attempt, kill, folder, outcome):
                 break
             self.clear(folder)
@@ -188,7 +190,7 @@ class Yard:
                 outcome.wrong.append(f"exit status {process.status}: {process.said[-300:]}")
         else:
             self._look(process, folder, outcome)
-            process = self._go_on(kill.start, folder, outcome)
+            process = self._go_on(kill.start, folder, outcome, kill.event if kill.again else 0)
             if kill.again:
                 second = Outcome(kill)
                 if self._kill(process, "loop", kill.then, kill, folder, second):
@@ -203,15 +205,17 @@ class Yard:
         outcome.same = not bad
         outcome.wrong += bad
 
-    def _go_on(self, how: str, folder: Path, outcome: Outcome) -> Process:
+    def _go_on(self, how: str, folder: Path, outcome: Outcome, event: int = 0) -> Process:
         outcome.resumed += 1
-        return self.go_on(folder, how)
+        return self.go_on(folder, how, event)
 
     def _kill(self, process: Process, moment: str, part: float, kill: Kill, folder: Path, outcome: Outcome) -> bool:
         """Kill at a moment; return whether it was still alive."""
         clock = time.perf_counter()
         exists, loops, ends = self.measure(kill.start)
-        if moment == "before":
+        if kill.event:
+            self._until(process, _stands, folder)
+        elif moment == "before":
             time.sleep(part * exists)
         elif moment == "life":
             self._until(process, _exists, folder)
@@ -219,7 +223,7 @@ class Yard:
         else:
             self._until(process, _loops, folder)
             time.sleep(part * (ends - loops) * (0.6 if moment == "commit" else 1.0))
-        if moment == "commit":
+        if moment == "commit" and not kill.event:
             self._until(process, _commits, folder)
         victims = process.workers()
         if process.poll() is not None or (kill.victim == "worker" and not victims):
@@ -287,6 +291,15 @@ def _kept(left: Contents, noted: Record, reference: Contents, outcome: Outcome) 
 def _said_complete(process: Process) -> bool:
     """Whether there was nothing to resume any more."""
     return process.said.strip() == f"error: {NAME}: the run is complete; there is nothing to resume"
+
+
+def _launch(how: str, event: int) -> Launch:
+    """Start of a run that stands still at an event; 0 for none."""
+    return partial(copied, event=event) if event else LAUNCH[how]
+
+
+def _stands(process: Process, folder: Path) -> bool:
+    return psutil.Process(process.pid).status() == psutil.STATUS_STOPPED
 
 
 def _exists(process: Process, folder: Path) -> bool:

@@ -107,13 +107,14 @@ def command(folder: Path, name: str, words: Sequence[str]) -> Process:
     return Process(started.pid, log, said)
 
 
-def copied(folder: Path, name: str, words: Sequence[str]) -> Process:
+def copied(folder: Path, name: str, words: Sequence[str], event: int = 0) -> Process:
     """Start ``tiengine WORDS...`` as a copy of this process, which must have run the scenario before.
 
     Args:
         folder: Working folder.
         name: Name of its log.
         words: Arguments.
+        event: Event of its writer at which it stands still (:mod:`validation.faults.record`); 0 for none.
     """
     log, said = _beside(folder, name)
     sys.stdout.flush()
@@ -122,7 +123,7 @@ def copied(folder: Path, name: str, words: Sequence[str]) -> Process:
     if not pid:
         status = 70
         try:
-            status = _as_command(folder, log, said, words)
+            status = _as_command(folder, log, said, words, event)
         finally:
             os._exit(status)
     return Process(pid, log, said)
@@ -145,7 +146,7 @@ def keep_shapes() -> None:
     plate.tabulate_shapes = tabulate
 
 
-def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str]) -> int:
+def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str], event: int) -> int:
     """Run the command in a copy."""
     import logging
 
@@ -161,7 +162,7 @@ def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str]) -> in
     os.dup2(file, 1)
     os.dup2(file, 2)
     logging.disable()
-    recorded(log)
+    recorded(log, event)
     worker.multiprocessing = _Copies()  # type: ignore[assignment,attr-defined]
     try:
         main(list(words), prog_name="tiengine", standalone_mode=True)

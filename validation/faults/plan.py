@@ -61,6 +61,8 @@ class Kill:
         victim, moment, start, again: See ``cases.toml``.
         part: Share of the time that the moment leaves open, 0...1.
         then: The same for the second kill.
+        event: Instead of the moment: event of the writer (:mod:`validation.faults.record`) at which a copy stands still
+            until it is killed, whatever the pace of the machine; 0 for none.
     """
 
     run: str
@@ -70,6 +72,7 @@ class Kill:
     part: float
     then: float
     again: bool = False
+    event: int = 0
 
 
 def kills(run: str, share: float = 1.0, seed: int = SEED) -> list[Kill]:

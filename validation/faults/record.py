@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -40,18 +41,27 @@ class Record:
     lost_bytes: int
 
 
-def recorded(log: Path) -> None:
+def recorded(log: Path, event: int = 0) -> None:
     """Let the writer of this process log its blocks and commits.
 
     Args:
         log: File to append to.
+        event: Event at which the process stands still, the first is 1; 0 for none. Events are a block written, a commit
+            about to begin, and a commit made.
     """
     file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
     written = {"samples": 0, "bytes": 0}
+    events = 0
     write, commit = writer.Writer.write, writer.Writer.commit
 
     def note(**facts: Any) -> None:
         os.write(file, f"{json.dumps(facts)}\n".encode())
+
+    def happened() -> None:
+        nonlocal events
+        events += 1
+        if events == event:
+            os.kill(os.getpid(), signal.SIGSTOP)
 
     def noted_write(self: Any, train: int, blocks: Mapping[str, Any]) -> None:
         write(self, train, blocks)
@@ -59,11 +69,14 @@ def recorded(log: Path) -> None:
         for block in blocks.values():
             written["bytes"] += sum(values.size for values in block.channels.values()) * REAL + 16 * len(block.along)
         note(**written)
+        happened()
 
     def noted_commit(self: Any) -> None:
+        happened()
         commit(self)
         known = sorted({train for train, _ in self._columns})
         note(rows={str(train): self.rows(train) for train in known}, **written)
+        happened()
 
     writer.Writer.write, writer.Writer.commit = noted_write, noted_commit  # type: ignore[method-assign]
 

@@ -20,7 +20,7 @@ from validation.speed.page import busy_words, page, show
 from validation.speed.roofline import roofline
 from validation.speed.runs import Facts, in_turn
 from validation.speed.scaling import scaling
-from validation.speed.throughput import batch, one_train
+from validation.speed.throughput import BATCHES, ONE_CAR, TRAINS, batch, one_car, trains
 
 REPORT = Path(__file__).resolve().parents[1] / "report"
 PIPE_WIDTH = 160  # columns where there is no terminal
@@ -43,11 +43,10 @@ class Case:
 
 
 CASES = {
-    "one_train": Case(("paper", "default"), lambda effort, rounds, notify: one_train(rounds)),
-    "batch": Case(("batch", "batch_one_worker", "batch_threads"), lambda effort, rounds, notify: batch(rounds)),
-    "full_length": Case(
-        ("paper", "batch", "full_20", "full_90"), lambda effort, rounds, notify: full_length(effort, rounds)
-    ),
+    "trains": Case(TRAINS, lambda effort, rounds, notify: trains(rounds)),
+    "one_car": Case(ONE_CAR, lambda effort, rounds, notify: one_car(rounds)),
+    "batch": Case(BATCHES, lambda effort, rounds, notify: batch(rounds)),
+    "full_length": Case(("default", "batch", "full"), lambda effort, rounds, notify: full_length(effort, rounds)),
     "command": Case((), lambda effort, rounds, notify: command(effort)),
     "roofline": Case((), lambda effort, rounds, notify: roofline(effort)),
     "scaling": Case((), lambda effort, rounds, notify: scaling(effort, notify)),
@@ -56,7 +55,7 @@ CASES = {
 
 
 @click.command()
-@click.option("--quick", is_flag=True, help="Measure in about four minutes: fewer repeats, shorter distances.")
+@click.option("--quick", is_flag=True, help="Measure in about five minutes: fewer repeats, shorter distances.")
 @click.option("--long", "far", is_flag=True, help="Measure a run of 100 km as well.")
 @click.option("--only", multiple=True, type=click.Choice(tuple(CASES)), help="Measure only this case; may be repeated.")
 @click.option("--draw", is_flag=True, help="Measure nothing; make table, page and figures from the kept findings.")
@@ -95,7 +94,7 @@ def _measure(chosen: Sequence[str], much: Effort, console: Console) -> dict[str,
     if start.busy:
         console.print(f"[yellow]{busy_words('warning', asdict(start))}[/]")
     runs = tuple(dict.fromkeys(run for name in chosen for run in CASES[name].runs))
-    rounds = in_turn(runs, much.rounds, much.distance, notify)
+    rounds = in_turn(runs, much.rounds, much.share, notify)
     found = {}
     for name in chosen:
         notify(name.replace("_", " "))

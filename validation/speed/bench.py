@@ -4,28 +4,36 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tiengine.engine.stepper import Plan, Stepper
-from tiengine.model.model import Ingredients, build_model
-from tiengine.profiling.timed_loop import StageTimer, Times
+from tiengine.engine.stepper import BETWEEN_STEPS, Plan, Stepper
+from tiengine.model.from_scenario import ingredients
+from tiengine.model.model import build_model
 from tiengine.scenario.scenario import Scenario
 from tiengine.simulation.tasks import Task
 from tiengine.simulation.time_loop import CHUNK_STEPS, LoopTimer, Run
+from validation.speed.runs import step_of
 
 __all__ = ["Bench", "timed_in_turn"]
 
 WARM_UP = 100  # steps
 
 
-class _AllTimed(StageTimer):
-    """Stage timers in every step."""
+class _Launches(LoopTimer):
+    """Counts how often the stages of a step are called: once a launch."""
+
+    count = 0
 
     def take(self, stepper: Stepper, plan: Plan) -> None:
         """Take the steps of a chunk."""
-        self.take_timed(stepper, plan)
+        stepper.time_stages(self._note)
+        stepper.take(plan)
+        stepper.time_stages(None)
+
+    def _note(self, name: str) -> None:
+        self.count += name == BETWEEN_STEPS
 
 
 @dataclass(eq=False)
@@ -39,16 +47,17 @@ class Bench:
     run: Run
 
     @classmethod
-    def of(cls, scenario: Scenario, ingredients: Ingredients, steps: int) -> Bench:
+    def of(cls, scenario: Scenario, trains: int, steps: int) -> Bench:
         """Set up.
 
         Args:
             scenario: Scenario of one train, long enough for all steps.
-            ingredients: Ingredients of the model, number of trains included.
+            trains: Trains advanced together.
             steps: Steps in a block.
         """
-        model = build_model(ingredients, scenario.train.speed.fastest)
-        seeds = range(ingredients.trains)
+        given = replace(ingredients(scenario, step_of(scenario)), trains=trains)
+        model = build_model(given, scenario.train.speed.fastest)
+        seeds = range(trains)
         tracks = tuple(scenario.irregularity.model_copy(update={"seed": seed}) for seed in seeds)
         bench = cls(Run.of(Task(0, scenario, tuple(seeds), tracks), model))
         bench.block_us(min(WARM_UP, steps))
@@ -61,14 +70,13 @@ class Bench:
         spent = time.perf_counter_ns() - clock
         return spent * 1e-3 / steps
 
-    def shares(self, steps: int) -> dict[str, float]:
-        """Share of each stage of the step, the largest first."""
-        times = Times.of(self.run.stepper)
-        self.run.timer = _AllTimed(times, steps)
+    def steps_a_launch(self, steps: int) -> float:
+        """Steps of a launch, mean over a block."""
+        counter = _Launches()
+        self.run.timer = counter
         self._advance(steps)
         self.run.timer = LoopTimer()
-        total = sum(times.stages.values())
-        return {name: ns / total for name, ns in sorted(times.stages.items(), key=lambda item: -item[1])}
+        return steps / counter.count
 
     def _advance(self, steps: int) -> None:
         """Take steps.

@@ -1,4 +1,4 @@
-"""Wall time of the whole command ``tiengine run paper``, with warm and with empty caches."""
+"""Wall time of the whole command ``tiengine run default``, with warm and with empty caches."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tiengine import result as results
 from tiengine.parameters.cache_folders import TABLES
 from validation.speed.effort import Effort
 from validation.speed.findings import Findings
-from validation.speed.runs import CASES, Facts, median_of
+from validation.speed.runs import Facts, median_of
 
 __all__ = ["command"]
 
@@ -48,18 +48,12 @@ def once(folder: Path, cache: Path, *settings: str) -> Facts:
     Returns:
         Attributes of the result, and ``wall``, the wall time of the whole process [s].
     """
-    path = folder / "paper.h5"
-    common = (f"{key}={_toml(value)}" for key, value in CASES["common"].items())
-    chosen = [word for each in (*common, *settings) for word in ("--set", each)]
-    words = [sys.executable, "-c", ENTRY, "run", "paper", "--quiet", "--force", "-o", str(path), *chosen]
+    path = folder / "default.h5"
+    words = [sys.executable, "-c", ENTRY, "run", "default", "--quiet", "--force", "-o", str(path)]
+    words += [word for each in settings for word in ("--set", each)]
     environment = os.environ | {CACHE: str(cache), TABLES: str(cache / "contact")}
     clock = time.perf_counter()
     subprocess.run(words, check=True, env=environment)
     wall = time.perf_counter() - clock
     with results.open(path) as result:
         return result.attributes | {"wall": wall}
-
-
-def _toml(value: Any) -> str:
-    """Text of a value for ``--set``."""
-    return str(value).replace("'", '"') if isinstance(value, list) else str(value)

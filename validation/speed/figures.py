@@ -25,8 +25,10 @@ OURS, FULL, OTHERS, BEST = (
 )  # Okabe-Ito palette, distinct for colour-blind readers
 STAGE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
 
+MARKS = ("o", "s", "^")
+"""Marks of one car, many cars, eight cars."""
 LEFT = 0.01  # start of the bars
-TICKS = [tick * 10**decade for decade in (1, 2, 3) for tick in (1, 1.5, 2, 3, 5, 7)]
+TICKS = [tick * 10**decade for decade in (0, 1, 2, 3) for tick in (1, 1.5, 2, 3, 5, 7)]
 
 Cases = Mapping[str, Any]
 
@@ -43,7 +45,7 @@ def draw(cases: Cases, folder: Path) -> list[str]:
     """
     drawn = []
     for name, (case, make) in {
-        "speed_factors.png": ("one_train", _factors),
+        "speed_factors.png": ("trains", _factors),
         "speed_scaling.png": ("scaling", _scaling),
         "speed_roofline.png": ("roofline", _roofline),
     }.items():
@@ -86,55 +88,44 @@ def _factors(cases: Cases) -> Any:
 
 def _bars(cases: Cases) -> Any:
     """Label, source, smallest and largest factor, colour."""
-    machine = cases["one_train"]["circumstances"]["machine"]
+    machine = cases["trains"]["circumstances"]["machine"]
     here = f"measured here, {machine['cpu']}, {machine['cores']} cores"
-    paper, peer, peers = (PUBLISHED[name] for name in ("paper", "peer", "peers"))
-    yield paper["label"], paper["source"], paper["rtf"], paper["rtf"], OTHERS
-    yield peers["label"], peers["source"], peers["rtf_from"], peers["rtf_to"], OTHERS
+    values = cases["trains"]["values"]
+    yield "tiengine, eight cars", here, values["rtf_train8"], values["rtf_train8"], OURS
+    yield "tiengine, sixteen cars", here, values["rtf_train16"], values["rtf_train16"], OURS
+    for case, key, words, source, colour in (
+        ("batch", "rtf_per_train8", "tiengine, per train of 16 with eight cars", f"{here}, two workers", OURS),
+        ("one_car", "rtf_default", "tiengine, one car", here, OURS),
+        ("batch", "rtf_per_train", "tiengine, per train of 64 with one car", f"{here}, two workers", OURS),
+        ("one_car", "rtf_paper", "tiengine, one car, the paper's sines", here, OURS),
+        ("full_length", "rtf", "our full-length model, one car, accurate as the default", f"{here}, 600 m", FULL),
+    ):
+        if case in cases:
+            rtf = cases[case]["values"][key]
+            yield words, source, rtf, rtf, colour
+    peer, peers, paper = (PUBLISHED[name] for name in ("peer", "peers", "paper"))
     yield peer["label"], peer["source"], peer["rtf"], peer["rtf"], OTHERS
-    if "full_length" in cases:
-        values = cases["full_length"]["values"]
-        for modes in (90, 20):
-            rtf = values[f"rtf_{modes}"]
-            yield f"our full-length model, 600 m, {modes} modes per slab", here, rtf, rtf, FULL
-    one = cases["one_train"]["values"]
-    yield "tiengine, default numerics, one train", here, one["rtf_default"], one["rtf_default"], OURS
-    yield "tiengine, the paper's case, one train", here, one["rtf"], one["rtf"], OURS
-    if "batch" in cases:
-        rtf = cases["batch"]["values"]["rtf_per_train"]
-        yield "tiengine, the paper's case, per train of 64", f"{here}, two workers", rtf, rtf, OURS
+    yield peers["label"], peers["source"], peers["rtf_from"], peers["rtf_to"], OTHERS
+    yield paper["label"], paper["source"], paper["rtf"], paper["rtf"], OTHERS
 
 
 def _scaling(cases: Cases) -> Any:
     """Draw the cost of a step over everything that was varied."""
     data = cases["scaling"]["data"]
-    panels = {name: axis for name, axis in data.items() if name != "outputs"}
-    outputs = data["outputs"]
-    panels["interval"] = outputs["interval"] | {"words": "steps between samples of everything", "unit": "step"}
-    panels["channels"] = outputs["channels"] | {"words": "channels of a wheel, every step", "unit": "step"}
-    figure, axes = plt.subplots(2, 3, figsize=(11.0, 6.6), layout="constrained")
-    for axis, found in zip(axes.flat, panels.values(), strict=True):
+    figure, axes = plt.subplots(2, 2, figsize=(9.0, 6.6), layout="constrained")
+    for axis, found in zip(axes.flat, data.values(), strict=True):
         x, us = np.array(found["x"]), np.array(found["us"])
         axis.loglog(x, us, "o", color=OURS, markersize=6)
         p = found["exponent"]
         fit = np.exp(np.mean(np.log(us) - p * np.log(x))) * x**p
         axis.loglog(x, fit, color=BEST, linewidth=1.1, label=f"fit: exponent {p:.2f}")
-        if "exponent_upper" in found:
-            axis.plot([], [], " ", label=f"upper half: {found['exponent_upper']:.2f}")
-        axis.set_xticks(x, [f"{each:g}" for each in x])
+        axis.plot([], [], " ", label=f"upper half: {found['exponent_upper']:.2f}")
+        axis.set_xticks(x, [f"{each:.3g}" for each in x])
         axis.minorticks_off()
         low, high = us.min() / 1.5, us.max() * 1.5
         ticks = [tick for tick in TICKS if low < tick < high]
         axis.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
         axis.set(xlabel=found["words"], ylabel=f"µs per {found['unit']}", ylim=(low, high))
-        if "shares_last" in found:
-            shares = list(found["shares_last"].items())[:2]
-            text = "at the last point:\n" + "\n".join(f"{stage} {share:.0%}" for stage, share in shares)
-            corner = (0.04, 0.04) if p < 0 else (0.96, 0.04)
-            axis.text(
-                *corner, text, transform=axis.transAxes, fontsize=7.5, color="0.35",
-                ha="left" if p < 0 else "right", va="bottom",
-            )  # fmt: skip
         axis.grid(color="0.9")
         axis.spines[["top", "right"]].set_visible(False)
         axis.legend(frameon=False, fontsize=8, loc="upper right" if p < 0 else "upper left")
@@ -142,13 +133,13 @@ def _scaling(cases: Cases) -> Any:
 
 
 def _roofline(cases: Cases) -> Any:
-    """Draw the rates of the products of each stage over their intensity, with the machine's roofline."""
+    """Draw the rates of the stages over their intensity, with the machine's roofline."""
     data = cases["roofline"]["data"]
     roofs = data["one"]["roofs"]
     figure, axis = plt.subplots(figsize=(8.5, 5.2), layout="constrained")
-    x = np.logspace(-1.2, 1.8, 200)
+    x = np.logspace(-1.5, 1.5, 200)
     for key, words, line in (
-        ("gemv_gb_per_s", "matrix in the second-level cache", "-"),
+        ("triad_l2_gb_per_s", "second-level cache", "-"),
         ("triad_dram_gb_per_s", "main memory", "--"),
     ):
         bandwidth = roofs[key]
@@ -158,10 +149,10 @@ def _roofline(cases: Cases) -> Any:
         )  # fmt: skip
     _points(axis, data)
     axis.set(
-        xlabel="operations over bytes of operands and result [flop/B]",
-        ylabel="rate of the matrix products [GFLOP/s]",
+        xlabel="counted operations over bytes touched [flop/B]",
+        ylabel="rate of a stage [GFLOP/s]",
         xlim=(x[0], x[-1]),
-        ylim=(0.5, 1.6 * roofs["dgemm_gflops"]),
+        ylim=(0.2, 1.6 * roofs["dgemm_gflops"]),
     )
     axis.grid(color="0.9", which="both", linewidth=0.5)
     axis.spines[["top", "right"]].set_visible(False)
@@ -170,18 +161,17 @@ def _roofline(cases: Cases) -> Any:
 
 
 def _points(axis: Any, data: Mapping[str, Any]) -> None:
-    """Draw one colour per stage, hollow for one train, filled for many."""
-    stages: Sequence[str] = [rate["stage"] for rate in data["one"]["rates"]]
-    for name, mark in (("one", "o"), ("many", "s")):
-        trains = data[name]["trains"]
-        for rate in data[name]["rates"]:
-            colour = STAGE_COLOURS[stages.index(rate["stage"]) % len(STAGE_COLOURS)]
+    """Draw one colour per stage, one mark per group of trains."""
+    stages: Sequence[str] = [stage["name"] for stage in data["one"]["stages"]]
+    for (name, group), mark in zip(data.items(), MARKS, strict=True):
+        for stage in group["stages"]:
+            if not stage["us"] > 0.0:
+                continue  # too short for the clock
+            colour = STAGE_COLOURS[stages.index(stage["name"])]
             axis.loglog(
-                rate["flops_per_step"] / rate["bytes_per_step"], rate["gflops"], mark, color=colour, markersize=8,
-                markerfacecolor="white" if name == "one" else colour, markeredgewidth=1.6,
-                label=rate["stage"] if name == "many" else None,
+                stage["flops"] / stage["traffic"], 1e-3 * stage["flops"] / stage["us"], mark, color=colour,
+                markersize=8, markerfacecolor="white" if group["trains"] == 1 else colour, markeredgewidth=1.6,
+                label=stage["name"] if name == "many" else None,
             )  # fmt: skip
-        fill = "white" if name == "one" else "0.4"
-        axis.plot(
-            [], [], mark, color="0.4", markerfacecolor=fill, label=f"{trains} train{'s together' if trains > 1 else ''}"
-        )
+        fill = "white" if group["trains"] == 1 else "0.4"
+        axis.plot([], [], mark, color="0.4", markerfacecolor=fill, label=f"{group['trains']} x {group['words']}")

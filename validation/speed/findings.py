@@ -18,7 +18,7 @@ from validation.speed.runs import CASES
 
 __all__ = ["Circumstances", "Findings", "Row", "circumstances", "read", "rows", "write"]
 
-FORMAT, FORMAT_VERSION = "tiengine-speed", 1
+FORMAT, FORMAT_VERSION = "tiengine-speed", 2
 BUSY = 0.25  # cores used by others, above which comparisons remain valid but absolute times do not
 MISSING = "not measured"
 

@@ -1,4 +1,8 @@
-"""Window against whole rails with the same integrator, time step and passes, and run time of the latter's stages."""
+"""Window against whole rails with the same integrator and passes, at equal accuracy.
+
+The full-length model gets the sines per metre and the time step that it needs to be as accurate as the default
+numerics, or less; :mod:`validation.speed.accuracy` measures the errors of both.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +11,10 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
+from validation.speed.accuracy import accuracy
 from validation.speed.effort import Effort
 from validation.speed.findings import Findings
-from validation.speed.runs import MODES_PER_METRE, RAIL, RUNS, Facts, apart, median_of, settings_of
+from validation.speed.runs import RAIL, RUNS, Facts, apart, median_of, settings_of
 from validation.speed.throughput import factors, step_us
 
 __all__ = ["full_length", "profile_full_length"]
@@ -25,48 +28,51 @@ STAGES = {
 }
 """Methods of ``FullStepper`` in which a step spends its time, and the names that the report gives them."""
 WARM_UP = 20  # steps
+PROFILE_STEPS = 500
+ACCURACY_DISTANCE = 90.0  # m
 TRANSFORMS, REST = "seats, sine transforms", "vehicle's solve and recording"
 
 
 def full_length(effort: Effort, rounds: Mapping[str, Sequence[Facts]]) -> Findings:
-    """Measure ratios of real-time factors, and profile the full-length step."""
-    one, batch = (median_of(rounds[name], "real_time_factor") for name in ("paper", "batch"))
-    whole = {modes: median_of(rounds[f"full_{modes}"], "real_time_factor") for modes in (20, 90)}
-    found = apart(profile_full_length, *((modes, effort.profile_steps // 5) for modes in (20, 90)))
-    profiles = dict(zip(("20", "90"), found, strict=True))
-    seats, dense = profiles["20"], profiles["20"]["dense"]
-    without = step_us(rounds["full_20"]) - seats["stages_us_per_step"][TRANSFORMS]
-    us = step_us(rounds["paper"])
+    """Measure ratios of real-time factors and the errors of both, and profile the full-length step."""
+    one, batch, whole = (median_of(rounds[name], "real_time_factor") for name in ("default", "batch", "full"))
+    density, step = RUNS["full"].modes_per_metre or 0.0, float(rounds["full"][0]["time_step"])
+    numerics = list(dict.fromkeys([*effort.full_length, (density, step)]))
+    (errors,) = apart(accuracy, (numerics, ACCURACY_DISTANCE))
+    error = errors["full_length"][numerics.index((density, step))]["p99"]
+    (profile,) = apart(profile_full_length, (density, step, PROFILE_STEPS))
+    full, default = rounds["full"][0]["dofs"], rounds["default"][0]["dofs"]
+    us, default_us = step_us(rounds["full"]), step_us(rounds["default"])
     return Findings(
         {
-            "rtf_20": whole[20],
-            "rtf_90": whole[90],
-            "ratio_one": whole[20] / one,
-            "ratio_batch": whole[20] / batch,
-            "ratio_one_90": whole[90] / one,
-            "ratio_batch_90": whole[90] / batch,
-            "us_per_step_20": step_us(rounds["full_20"]),
-            "us_per_step_90": step_us(rounds["full_90"]),
-            "transforms_us": seats["stages_us_per_step"][TRANSFORMS],
-            "dense_us": dense["us_per_step"],
-            "dense_mb": dense["mb"],
-            "ratio_one_dense": (without + dense["us_per_step"]) / us,
-            "dofs": float(rounds["full_20"][0]["dofs"]),
-            "dofs_over_window": rounds["full_20"][0]["dofs"] / rounds["paper"][0]["dofs"],
+            "modes_per_metre": density,
+            "time_step_us": 1e6 * step,
+            "rtf": whole,
+            "ratio_one": whole / one,
+            "ratio_batch": whole / batch,
+            "us_per_step": us,
+            "ns_per_dof": 1e3 * us / full,
+            "default_ns_per_dof": 1e3 * default_us / default,
+            "dofs": float(full),
+            "dofs_over_default": full / default,
+            "error": error,
+            "error_default": errors["default"]["p99"],
+            "error_ratio": error / errors["default"]["p99"],
         },
-        {"profiles": profiles, "rounds": factors(rounds, ("full_20", "full_90"))},
+        {"profile": profile, "accuracy": errors, "rounds": factors(rounds, ("full",))},
     )
 
 
-def profile_full_length(slab_modes: int, steps: int) -> dict[str, Any]:
+def profile_full_length(modes_per_metre: float, step: float, steps: int) -> dict[str, Any]:
     """Measure the stages of a full-length step by timers around its methods.
 
     Args:
-        slab_modes: Plate modes per slab.
+        modes_per_metre: Sines per metre and field.
+        step: Time step [s].
         steps: Number of steps.
 
     Returns:
-        Time of each stage and of a step [us], and of products with a dense matrix of sines.
+        Time of each stage and of a step [us].
     """
     from threadpoolctl import threadpool_limits  # imported here, since the parent does not need it
 
@@ -75,8 +81,8 @@ def profile_full_length(slab_modes: int, steps: int) -> dict[str, Any]:
     from validation.msm.simulate import FullLength, load, prepare
 
     distance = 0.8 * RAIL
-    scenario = load_scenario("paper", settings_of(RUNS["paper"], distance))
-    numerics = FullLength(RAIL, MODES_PER_METRE, slab_modes, float(scenario.numerics.time_step))
+    scenario = load_scenario(RUNS["full"].scenario, settings_of(RUNS["full"], distance))
+    numerics = FullLength(RAIL, modes_per_metre, scenario.parts.slab.plate_dofs, step)
     with threadpool_limits(1):
         stepper = prepare(scenario, numerics, *(WARM_UP + steps,) * 2)
         start = scenario.rear + scenario.centre_in_window
@@ -96,9 +102,8 @@ def profile_full_length(slab_modes: int, steps: int) -> dict[str, Any]:
         whole = time.perf_counter_ns() - clock
         spent["seats, transforms apart"] -= spent[TRANSFORMS]
         spent[REST] = whole - sum(spent.values())
-        dense = _dense(transform.seats, stepper.track.modes, stepper.track.passes)
     stages = {name: ns * 1e-3 / steps for name, ns in sorted(spent.items(), key=lambda item: -item[1])}
-    return {"us_per_step": whole * 1e-3 / steps, "stages_us_per_step": stages, "dense": dense}
+    return {"us_per_step": whole * 1e-3 / steps, "stages_us_per_step": stages}
 
 
 def _timed(call: Callable[..., Any], stage: str, spent: Counter[str]) -> Callable[..., Any]:
@@ -111,18 +116,3 @@ def _timed(call: Callable[..., Any], stage: str, spent: Counter[str]) -> Callabl
         return result
 
     return timed
-
-
-def _dense(seats: int, modes: int, passes: int, repeats: int = 30) -> dict[str, float]:
-    """Time products of six rows with the matrix of sines, to the seats and back, in each pass."""
-    j, i = np.arange(seats) + 0.5, np.arange(1, modes + 1)
-    sines = np.sin(np.pi / seats * np.outer(i, j))
-    amplitudes, back = np.ones((6, modes)), np.ascontiguousarray(sines.T)
-    times = []
-    for _ in range(repeats):
-        clock = time.perf_counter_ns()
-        for _ in range(passes):
-            forces = amplitudes @ sines
-            forces @ back
-        times.append(time.perf_counter_ns() - clock)
-    return {"us_per_step": float(np.median(times)) * 1e-3, "mb": sines.nbytes * 1e-6}

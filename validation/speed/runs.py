@@ -21,14 +21,15 @@ from typing import Any, TypeVar
 
 import psutil
 
-__all__ = ["CASES", "RUNS", "Facts", "Run", "apart", "in_turn", "median_of", "perform", "settings_of"]
+from tiengine.scenario.scenario import Scenario
+
+__all__ = ["CASES", "RUNS", "Facts", "Run", "apart", "in_turn", "median_of", "perform", "settings_of", "step_of"]
 
 T = TypeVar("T")
 Facts = dict[str, Any]
 CASES = tomllib.loads((Path(__file__).parent / "cases.toml").read_text(encoding="utf-8"))
 
 RAIL = 600.0  # m, of the full-length model
-MODES_PER_METRE = 2.0
 WARM_UP = 5.0  # m: the first launches load kernels
 
 
@@ -39,16 +40,18 @@ class Run:
     Attributes:
         words: Description.
         scenario: Built-in scenario.
+        distance: Distance of a whole measurement [m].
         settings: Overrides.
         workers: Number of processes.
-        slab_modes: Plate modes per slab of the full-length model; None for the engine.
+        modes_per_metre: Sines per metre of the full-length model; None for the engine.
     """
 
     words: str
     scenario: str
+    distance: float
     settings: dict[str, Any] = field(default_factory=dict)
     workers: int = 1
-    slab_modes: int | None = None
+    modes_per_metre: float | None = None
 
 
 RUNS = {name: Run(**table) for name, table in CASES["runs"].items()}
@@ -56,8 +59,15 @@ RUNS = {name: Run(**table) for name, table in CASES["runs"].items()}
 
 def settings_of(run: Run, distance: float) -> dict[str, Any]:
     """Overrides for a distance [m]."""
-    common: dict[str, Any] = CASES["common"]
-    return common | run.settings | {"train.distance": distance}
+    return run.settings | {"train.distance": distance}
+
+
+def step_of(scenario: Scenario) -> float:
+    """Time step of a run of ``cases.toml`` [s]; "auto" takes the longest, which their tracks and trains allow."""
+    from tiengine.engine.time_step import AUTO_STEPS  # imported here, since the parent starts no Taichi
+
+    wanted = scenario.numerics.time_step
+    return AUTO_STEPS[0] if wanted == "auto" else float(wanted)
 
 
 def perform(run: Run, distance: float) -> Facts:
@@ -78,10 +88,11 @@ def perform(run: Run, distance: float) -> Facts:
     scenario = load_scenario(run.scenario, settings_of(run, distance))
     with TemporaryDirectory(prefix="tiengine-speed-") as folder:
         path = Path(folder) / "run.h5"
-        if run.slab_modes is None:
+        if run.modes_per_metre is None:
             result = simulate(scenario, path, workers=run.workers)
         else:
-            numerics = FullLength(RAIL, MODES_PER_METRE, run.slab_modes, float(scenario.numerics.time_step))
+            slab_modes = scenario.parts.slab.plate_dofs  # all, as the window has them
+            numerics = FullLength(RAIL, run.modes_per_metre, slab_modes, step_of(scenario))
             result = run_full_length(scenario, numerics, path)
         with result:
             facts: Facts = result.attributes
@@ -90,15 +101,13 @@ def perform(run: Run, distance: float) -> Facts:
         return facts | {"file_mb": path.stat().st_size * 1e-6}
 
 
-def in_turn(
-    names: Sequence[str], rounds: int, distance: float, notify: Callable[[str], object]
-) -> dict[str, list[Facts]]:
+def in_turn(names: Sequence[str], rounds: int, share: float, notify: Callable[[str], object]) -> dict[str, list[Facts]]:
     """Run several, one after another, round by round.
 
     Args:
         names: Names of the runs.
         rounds: Number of repeats of each.
-        distance: Distance [m].
+        share: Part of each run's distance.
         notify: Called with a description of the next run.
 
     Returns:
@@ -115,7 +124,7 @@ def in_turn(
             for name, process in processes.items():
                 notify(f"{RUNS[name].words}, round {i + 1} of {rounds}")
                 before = _cpu_seconds()
-                found = process.submit(perform, RUNS[name], distance).result()
+                found = process.submit(perform, RUNS[name], share * RUNS[name].distance).result()
                 wall, own, everyone = (now - then for now, then in zip(_cpu_seconds(), before, strict=True))
                 facts[name].append(found | {"others_cores": max(everyone - own, 0.0) / wall})
     return facts

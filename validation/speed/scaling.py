@@ -1,9 +1,9 @@
-"""Cost of a step over modes, window, slabs, outputs and trains, with fitted exponents."""
+"""Cost of a step over cars, trains together, knots and slab mesh, with fitted exponents."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,7 @@ from validation.speed.runs import RUNS, apart, settings_of
 
 __all__ = ["AXES", "Axis", "exponent", "scaling"]
 
-PITCH = 5.67  # m, of the slabs
-MODES = 60
-PER_METRE = 60 / 36.0
-WAY = 600.0  # m, of the scenarios; a bench ignores it
+WAY = 600.0  # m, of the scenarios; more than a bench needs
 SETTLED = 0.5
 """A power law is fitted over all points, and over the upper half, where constant costs matter less."""
 
@@ -28,108 +25,83 @@ class Axis:
 
     Attributes:
         words: Description.
-        x: Values.
-        change: Changed fields of the engine's ingredients at a value.
+        points: Values.
+        settings: Changes of the scenario ``default`` at a value.
         unit: Unit of the cost: "step" of all trains, or "train-step".
+        x: Quantity at a value to draw over: None for the value itself, else a count of degrees of freedom.
     """
 
     words: str
-    x: tuple[float, ...]
-    change: Callable[[float], dict[str, Any]]
+    points: tuple[Any, ...]
+    settings: Callable[[Any], dict[str, Any]]
     unit: str = "step"
+    x: str | None = None
+
+
+def _knots(refinement: float) -> dict[str, Any]:
+    knots = {"finest": 0.15 / refinement, "coarsest": 1.0 / refinement}
+    return {"numerics.knots": knots}
+
+
+def _mesh(elements: tuple[int, int]) -> dict[str, Any]:
+    return {"track.slab": {"like": "CRTS_III", "elements_x": elements[0], "elements_y": elements[1]}}
 
 
 AXES = {
-    "modes": Axis("modes N of a rail field, window 36 m", (30, 60, 120, 240), lambda n: {"modes": int(n)}),
-    "window": Axis(
-        "window [m], 1.67 modes per metre",
-        (28, 40, 60, 84, 120),
-        lambda length: {"length": float(length), "modes": round(PER_METRE * length)},
-    ),
-    "slabs": Axis(
-        "slabs (60 modes, window as long)",
-        (6, 8, 12, 16, 24),
-        lambda slabs: {"length": (slabs - 1.5) * PITCH, "modes": MODES},  # a window touches one more than it is long
-    ),
-    "trains": Axis(
-        "trains together, one process", (1, 2, 4, 8, 16, 32, 64), lambda trains: {"trains": int(trains)}, "train-step"
-    ),
+    "cars": Axis("cars of one train", (1, 2, 4, 8, 16), lambda cars: {"train.vehicles": ["CRH380A_v2"] * cars}),
+    "trains": Axis("trains of one car together, one process", (1, 2, 4, 8, 16, 32, 64), lambda _: {}, "train-step"),
+    "knots": Axis("functions per metre and field", (0.5, 0.75, 1.0, 1.5, 2.0), _knots, x="functions"),
+    "mesh": Axis("coordinates of a slab", ((5, 2), (9, 2), (18, 2), (18, 4)), _mesh, x="slab_dofs"),
 }
-INTERVALS = (1, 2, 5, 10, 50)  # steps between two samples of everything
-CHANNELS = (1, 3, 6, 10, 14)  # of each wheel, every step
 
 
 def scaling(effort: Effort, notify: Callable[[str], object]) -> Findings:
-    """Measure every axis, then the outputs."""
-    calls = [(name, effort.bench_rounds, effort.bench_steps) for name in AXES]
-    data = dict(zip(AXES, apart(measure_axis, *calls), strict=True))
-    notify("recorded outputs")
-    (data["outputs"],) = apart(measure_outputs, (effort.rounds, effort.distance))
-    values = {f"{name}_exponent": found["exponent"] for name, found in data.items() if "exponent" in found}
-    return Findings({**values, **data["outputs"]["values"]}, data)
+    """Measure every axis."""
+    data = {}
+    for name in AXES:
+        notify(f"scaling, {AXES[name].words}")
+        (data[name],) = apart(measure_axis, (name, effort.bench_points, effort.bench_rounds, effort.bench_steps))
+    values = {f"{name}_exponent": found["exponent"] for name, found in data.items()}
+    values |= {f"{name}_exponent_upper": found["exponent_upper"] for name, found in data.items()}
+    return Findings({**values}, data)
 
 
-def measure_axis(name: str, rounds: int, steps: int) -> dict[str, Any]:
-    """Time of a step at every value of an axis [us], and its largest stages at the last."""
+def measure_axis(name: str, count: int | None, rounds: int, steps: int) -> dict[str, Any]:
+    """Time of a step at the first ``count`` values of an axis [us]."""
     from threadpoolctl import threadpool_limits  # imported here, since the parent starts no Taichi
 
     from tiengine.engine import backend
-    from tiengine.model.from_scenario import ingredients
     from tiengine.scenario.scenario import load_scenario
     from validation.speed.bench import Bench, timed_in_turn
 
     backend.start()
     axis = AXES[name]
-    scenario = load_scenario("paper", settings_of(RUNS["paper"], WAY))
-    given = ingredients(scenario, float(scenario.numerics.time_step))
+    points = axis.points[:count]
     with threadpool_limits(1):
-        benches = [Bench.of(scenario, replace(given, **axis.change(x)), steps) for x in axis.x]
+        benches = []
+        for point in points:
+            scenario = load_scenario("default", settings_of(RUNS["default"], WAY) | axis.settings(point))
+            benches.append(Bench.of(scenario, point if name == "trains" else 1, steps))
         us = timed_in_turn(benches, rounds, steps)
-        first, last = (bench.shares(steps) for bench in (benches[0], benches[-1]))
+    x = [float(_place(axis, point, bench)) for point, bench in zip(points, benches, strict=True)]
     if axis.unit == "train-step":
-        us = [each / x for each, x in zip(us, axis.x, strict=True)]
+        us = [each / trains for each, trains in zip(us, x, strict=True)]
     return {
         "words": axis.words,
         "unit": axis.unit,
-        "x": list(axis.x),
+        "x": x,
         "us": us,
-        "exponent": exponent(axis.x, us),
-        "exponent_upper": exponent(*_upper(axis.x, us)),
-        "shares_first": first,
-        "shares_last": last,
+        "exponent": exponent(x, us),
+        "exponent_upper": exponent(*_upper(x, us)),
     }
 
 
-def measure_outputs(rounds: int, distance: float) -> dict[str, Any]:
-    """Time of a step of whole runs [us], over the interval of all outputs and over the channels of a wheel."""
-    from tiengine.result_files.channels import WHEEL
-    from tiengine.scenario.scenario import load_scenario
-    from tiengine.simulation.simulate import run as simulate
-
-    dt, names = 2e-4, list(WHEEL)
-    chosen: dict[tuple[str, int], dict[str, Any]] = {}
-    for every in INTERVALS:
-        chosen["interval", every] = {"output.wheel_interval": every * dt, "output.body_interval": every * dt}
-    for count in CHANNELS:
-        chosen["channels", count] = {"output.wheel_channels": names[:count]}
-    spent: dict[tuple[str, int], list[float]] = {key: [] for key in chosen}
-    for _ in range(rounds):
-        for key, settings in chosen.items():
-            scenario = load_scenario("paper", settings_of(RUNS["paper"], distance) | settings)
-            with simulate(scenario, workers=1) as result:
-                facts = result.attributes
-            spent[key].append(1e6 * facts["wall_time_loop"] / facts["steps"])
-    us = {key: float(np.median(times)) for key, times in spent.items()}
-    interval, channels = ([us[kind, x] for x in xs] for kind, xs in (("interval", INTERVALS), ("channels", CHANNELS)))
-    return {
-        "interval": {"x": list(INTERVALS), "us": interval, "exponent": exponent(INTERVALS, interval)},
-        "channels": {"x": list(CHANNELS), "us": channels, "exponent": exponent(CHANNELS, channels)},
-        "values": {
-            "outputs_interval_exponent": exponent(INTERVALS, interval),
-            "outputs_channels_exponent": exponent(CHANNELS, channels),
-            "outputs_us_per_channel": float(np.polyfit(CHANNELS, channels, 1)[0]),
-        },
-    }
+def _place(axis: Axis, point: Any, bench: Any) -> float:
+    """Quantity to draw over."""
+    given = bench.run.stepper.ingredients
+    if axis.x == "functions":
+        return float(given.functions.count / given.length)
+    return float(given.designs.matrices[0].n) if axis.x == "slab_dofs" else float(point)
 
 
 def exponent(x: Sequence[float], y: Sequence[float]) -> float:

@@ -1,4 +1,4 @@
-"""One train and 64 trains: real-time factors of the loop, writing included."""
+"""Single trains and batches: real-time factors of the loop, writing included."""
 
 from __future__ import annotations
 
@@ -7,9 +7,16 @@ from collections.abc import Mapping, Sequence
 from validation.speed.findings import Findings
 from validation.speed.runs import Facts, median_of
 
-__all__ = ["batch", "factors", "one_train", "step_us"]
+__all__ = ["BATCHES", "ONE_CAR", "TRAINS", "batch", "factors", "one_car", "step_us", "trains"]
 
 Rounds = Mapping[str, Sequence[Facts]]
+
+ONE_CAR = ("default", "paper")
+TRAINS = ("train8", "train16")
+BATCHES = ("batch", "batch_one_worker", "batch8")
+"""Runs of the cases."""
+
+WORKERS = 2
 
 
 def step_us(facts: Sequence[Facts]) -> float:
@@ -17,40 +24,51 @@ def step_us(facts: Sequence[Facts]) -> float:
     return 1e6 * median_of(facts, "real_time_factor") * float(facts[0]["time_step"])
 
 
-def one_train(rounds: Rounds) -> Findings:
-    """Runs ``paper`` and ``default``."""
-    paper, default = rounds["paper"], rounds["default"]
-    return Findings(
-        {
-            "rtf": median_of(paper, "real_time_factor"),
-            "rtf_default": median_of(default, "real_time_factor"),
-            "us_per_step": step_us(paper),
-            "us_per_step_default": step_us(default),
-            "dofs": float(paper[0]["dofs"]),
-            "dofs_default": float(default[0]["dofs"]),
-            "peak_memory_mb": median_of(paper, "peak_memory"),
-        },
-        {"rounds": factors(rounds, ("paper", "default"))},
-    )
+def one_car(rounds: Rounds) -> Findings:
+    """Runs ``default`` and ``paper``."""
+    values = {"peak_memory_mb": median_of(rounds["default"], "peak_memory")}
+    for name in ONE_CAR:
+        facts = rounds[name]
+        values |= {
+            f"rtf_{name}": median_of(facts, "real_time_factor"),
+            f"us_{name}": step_us(facts),
+            f"dofs_{name}": float(facts[0]["dofs"]),
+        }
+    return Findings({**values}, {"rounds": factors(rounds, ONE_CAR)})
+
+
+def trains(rounds: Rounds) -> Findings:
+    """Runs ``train8`` and ``train16``."""
+    values: dict[str, float] = {}
+    for name in TRAINS:
+        facts = rounds[name]
+        values |= {
+            f"rtf_{name}": median_of(facts, "real_time_factor"),
+            f"us_{name}": step_us(facts),
+            f"setup_{name}_s": median_of(facts, "wall_time_setup"),
+            f"peak_memory_{name}_mb": median_of(facts, "peak_memory"),
+        }
+    values["ratio_train16"] = values["rtf_train16"] / values["rtf_train8"]
+    return Findings({**values}, {"rounds": factors(rounds, TRAINS)})
 
 
 def batch(rounds: Rounds) -> Findings:
-    """Runs ``batch``, ``batch_one_worker``, ``batch_threads``."""
-    two, one, threads = (median_of(rounds[name], "real_time_factor") for name in _BATCHES)
-    trains, dt = 64.0, float(rounds["batch"][0]["time_step"])
+    """Runs ``batch``, ``batch_one_worker``, ``batch8``."""
+    two, one, eight = (median_of(rounds[name], "real_time_factor") for name in BATCHES)
+    us, us8 = (1e6 * rtf * float(rounds[name][0]["time_step"]) for rtf, name in ((two, "batch"), (eight, "batch8")))
     return Findings(
         {
-            "trains": trains,
             "rtf_per_train": two,
             "rtf_per_train_one_worker": one,
-            "rtf_per_train_threads": threads,
-            "core_us_per_train_step": 2e6 * two * dt,
+            "rtf_per_train8": eight,
+            "core_us_per_train_step": WORKERS * us,
+            "core_us_per_train8_step": WORKERS * us8,
             "gain_of_workers": one / two,
-            "processes_over_threads": threads / two,
             "peak_memory_mb": median_of(rounds["batch"], "peak_memory"),
             "peak_memory_one_worker_mb": median_of(rounds["batch_one_worker"], "peak_memory"),
+            "peak_memory_batch8_mb": median_of(rounds["batch8"], "peak_memory"),
         },
-        {"rounds": factors(rounds, _BATCHES)},
+        {"rounds": factors(rounds, BATCHES)},
     )
 
 
@@ -58,6 +76,3 @@ def factors(rounds: Rounds, names: Sequence[str]) -> dict[str, dict[str, list[fl
     """Real-time factor of every round, and cores used by other processes meanwhile, by run."""
     keys = {"rtf": "real_time_factor", "others_cores": "others_cores"}
     return {name: {key: [float(each[fact]) for each in rounds[name]] for key, fact in keys.items()} for name in names}
-
-
-_BATCHES = ("batch", "batch_one_worker", "batch_threads")
