@@ -210,9 +210,7 @@ class Numerics(Params):
     slab_count: Annotated[
         Literal["cover", "paper"], Field(description="slabs under the whole window, or the source paper's count")
     ] = "cover"
-    threads: Annotated[
-        int, Q("-", "threads of Taichi's loop over trains; 1 with splines", ge=1, le=1024)
-    ] = 1
+    threads: Annotated[int, Q("-", "threads of Taichi's loop over trains; 1 with splines", ge=1, le=1024)] = 1
 
     def modes(self, window: float) -> int:
         """Sines of each rail field in a window of the given length [m]."""
