@@ -16,9 +16,8 @@ one times the last factor estimates the remaining error, and the iteration ends 
 import taichi as ti
 
 from tiengine.kernels import layout as at
-from tiengine.kernels import under_wheels as uw
 from tiengine.kernels import wheel_rail as wr
-from tiengine.kernels.types import Array, Reals1, Reals2, Reals3, Reals4, Template
+from tiengine.kernels.types import Array, Template
 
 ITERATIONS = 50
 SMALLEST_SHARE = 1.0 / 128.0  # of a Newton step: it is not halved further
@@ -106,9 +105,9 @@ def rail_at_end(wheelset: int, free: Template, force: Template, before: Template
 @ti.func
 def state_of(
     side: Template, V: float, r0: float, b0: float, x: Template, dx: Template, rail: Template,
-    irregularity: Template, rolls: int, table: Array, constants: Array,
+    irregularity: Template, rolls: int, table: Array, constants: Array, patch: Template,
 ):  # fmt: skip
-    """Contact state of the left (0) or right (1) wheel."""
+    """Contact state of a patch of the left (0) or right (1) wheel."""
     return wr.contact_state(
         ti.static(2.0 * side - 1.0),
         V,
@@ -123,6 +122,7 @@ def state_of(
         rolls,
         table,
         constants,
+        patch,
     )
 
 
@@ -237,8 +237,8 @@ def solve_wheelset(
         dx = dx_free + constants[at.GAMMA_DT] * a
         rail_l = rail_at_end(wheelset, free_l, R_l @ f_l, before_l, constants, rail_coupling)
         rail_r = rail_at_end(wheelset, free_r, R_r @ f_r, before_r, constants, rail_coupling)
-        left = state_of(0, V, r0, b0, x, dx, rail_l, irregularity, rolls, table, constants)
-        right = state_of(1, V, r0, b0, x, dx, rail_r, irregularity, rolls, table, constants)
+        left = state_of(0, V, r0, b0, x, dx, rail_l, irregularity, rolls, table, constants, 0)
+        right = state_of(1, V, r0, b0, x, dx, rail_r, irregularity, rolls, table, constants, 0)
         store_state(b, wheelset, 0, left, contact)
         store_state(b, wheelset, 1, right, contact)
         place_l, place_r = wr.placing(left), wr.placing(right)
@@ -297,85 +297,3 @@ def record_wheels(b: int, wheelset: int, row: int, contact: Array, force: Array,
         wheel_out[b, row, wheelset, side, at.IRREGULARITY_VERTICAL] = contact[b, wheelset, side, wr.Z_IRR]
         wheel_out[b, row, wheelset, side, at.IRREGULARITY_LATERAL] = contact[b, wheelset, side, wr.Y_IRR]
         wheel_out[b, row, wheelset, side, at.RELATIVE_SHIFT] = contact[b, wheelset, side, wr.SHIFT]
-
-
-@ti.kernel
-def wheel_forces(
-    V: float,
-    rolls: int,
-    constants: Reals1,
-    table: Reals3,
-    wheel: Reals2,
-    irregularity: Reals3,
-    wheelset_u: Reals3,
-    wheelset_v: Reals3,
-    rail_motion: Reals4,
-    contact_out: Reals4,
-    force_out: Reals4,
-    wheelset_force_out: Reals3,
-    rail_force_out: Reals4,
-):
-    """Contact forces at given motions of wheels and rails, without any time step (start, references, tests).
-
-    Args:
-        V: Speed [m/s].
-        rolls: 1 if a cross level turns the railheads.
-        constants: Numbers, see ``layout``.
-        table: Contact geometry, shape (n_u, n_alpha, N_TABLE).
-        wheel: r0, b0, spin inertia of each wheelset, shape (wheelsets, 3).
-        irregularity: Track channels, shape (trains, wheelsets, N_IRREGULARITY).
-        wheelset_u: y, z, roll, pitch, yaw, shape (trains, wheelsets, 5).
-        wheelset_v: Their rates.
-        rail_motion: w, v, theta_x, their slopes, their rates at constant s, shape (trains, wheelsets, 2, 9).
-        contact_out: Contact states, see ``wheel_rail``, shape (trains, wheelsets, 2, N_CONTACT).
-        force_out: N, Fx, Fy, Mz on the wheels, shape (trains, wheelsets, 2, 4).
-        wheelset_force_out: Generalised forces on y, z, roll, pitch, yaw, shape (trains, wheelsets, 5).
-        rail_force_out: Generalised forces on w, v, theta_x, shape (trains, wheelsets, 2, 3).
-    """
-    ti.loop_config(serialize=True)
-    for b in range(wheelset_u.shape[0]):
-        for w in range(wheelset_u.shape[1]):
-            channels = ti.Vector.zero(ti.f64, at.N_IRREGULARITY)
-            for m in ti.static(range(at.N_IRREGULARITY)):
-                channels[m] = irregularity[b, w, m]
-            x, dx = ti.Vector.zero(ti.f64, 5), ti.Vector.zero(ti.f64, 5)
-            for m in ti.static(range(5)):
-                x[m] = wheelset_u[b, w, m]
-                dx[m] = wheelset_v[b, w, m]
-            left = state_of(
-                0,
-                V,
-                wheel[w, 0],
-                wheel[w, 1],
-                x,
-                dx,
-                uw.stored_rail(b, w, 0, rail_motion),
-                channels,
-                rolls,
-                table,
-                constants,
-            )
-            right = state_of(
-                1,
-                V,
-                wheel[w, 0],
-                wheel[w, 1],
-                x,
-                dx,
-                uw.stored_rail(b, w, 1, rail_motion),
-                channels,
-                rolls,
-                table,
-                constants,
-            )
-            f_l, _ = wr.contact_law(left, constants[at.FRICTION])
-            f_r, _ = wr.contact_law(right, constants[at.FRICTION])
-            B_l, R_l = wr.force_directions(-1.0, wheel[w, 0], wheel[w, 1], constants[at.ARM_HEAD], wr.placing(left))
-            B_r, R_r = wr.force_directions(1.0, wheel[w, 0], wheel[w, 1], constants[at.ARM_HEAD], wr.placing(right))
-            q = B_l @ f_l + B_r @ f_r
-            for m in ti.static(range(5)):
-                wheelset_force_out[b, w, m] = q[m]
-            store_state(b, w, 0, left, contact_out)
-            store_state(b, w, 1, right, contact_out)
-            store_force(b, w, 0, f_l, R_l @ f_l, force_out, rail_force_out)
-            store_force(b, w, 1, f_r, R_r @ f_r, force_out, rail_force_out)

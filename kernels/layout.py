@@ -78,6 +78,19 @@ MOTION_ROWS = 7
 # Channels of the irregularity at a wheelset: track values and their slopes along x.
 (Z_V, Y_A, CROSS_LEVEL, GAUGE, Z_V_SLOPE, Y_A_SLOPE, CROSS_LEVEL_SLOPE, GAUGE_SLOPE, N_IRREGULARITY) = range(9)
 
+# With shapes of single rails or wheels out of round: heights of either rail and their slopes; then as the host gives
+# them, how far the wheels' shapes have grown in, its derivative along x, the angle of rolling without slip on r0; or as
+# the contact feels them, radius deviations of either wheel and their slopes along the wheel's path.
+(RAIL_LEFT, RAIL_RIGHT, RAIL_LEFT_SLOPE, RAIL_RIGHT_SLOPE) = range(N_IRREGULARITY, N_IRREGULARITY + 4)
+(GROWN, GROWN_SLOPE, TURNED, N_SHAPED) = range(N_IRREGULARITY + 4, N_IRREGULARITY + 8)
+(WHEEL_LEFT, WHEEL_RIGHT, WHEEL_LEFT_SLOPE, WHEEL_RIGHT_SLOPE, N_FELT) = range(N_IRREGULARITY + 4, N_IRREGULARITY + 9)
+
+# Numbers of a wheelset: r0, b0, spin inertia, tables of its wheels out of round (-1 for none).
+(NOMINAL_RADIUS, HALF_SPACING, SPIN_INERTIA, ROUND_LEFT, ROUND_RIGHT, N_WHEEL_NUMBERS) = range(6)
+
+# Points of the table of a wheel out of round; the tables stand behind the numbers of ``constants``.
+ROUND_POINTS = 4096
+
 # Columns of the contact geometry table.
 (GAP, S_WHEEL, S_RAIL, RADIUS, TAN_GAMMA, HERTZ, C11, C22, C23, C33, N_TABLE) = range(11)
 
@@ -102,3 +115,26 @@ MOTION_ROWS = 7
     RELATIVE_SHIFT,
     N_WHEEL,
 ) = range(18)
+
+# Output of the patches of a wheel after its own, patch by patch, if it can have two; the angle in the track's frame.
+(
+    PATCH_NORMAL_FORCE,
+    PATCH_POSITION_WHEEL,
+    PATCH_POSITION_RAIL,
+    PATCH_ANGLE,
+    PATCH_LONGITUDINAL_CREEPAGE,
+    PATCH_LATERAL_CREEPAGE,
+    PATCH_SPIN_CREEPAGE,
+    PATCH_LONGITUDINAL_CREEP_FORCE,
+    PATCH_LATERAL_CREEP_FORCE,
+    PATCH_SPIN_MOMENT,
+    N_PATCH,
+) = range(11)
+
+CONTACT_ROWS = {1: 2, 2: 6}
+"""Rows of a wheelset in the arrays of contact states and local forces, by the patches of a wheel: left and right wheel,
+with two patches then left and right of the first and of the second. A wheel's forces are the sums over its patches, its
+contact state is that of the patch with the larger normal force."""
+
+N_WHEEL_RECORD = {1: N_WHEEL, 2: N_WHEEL + 2 * N_PATCH}
+"""Length of a wheel's output, by its patches."""

@@ -26,6 +26,7 @@ from tiengine.kernels import contact as ct
 from tiengine.kernels import fastening as fs
 from tiengine.kernels import layout as at
 from tiengine.kernels import mortar, rail, suspension
+from tiengine.kernels import patches as pt
 from tiengine.kernels import under_wheels as uw
 from tiengine.kernels.types import Array, Ints1, Ints2, Reals1, Reals2, Reals3, Reals4, Reals5, Template
 
@@ -151,6 +152,7 @@ def mortar_forces(
 @ti.kernel
 def forces_and_contact(
     parallel: Template,
+    patches: Template,
     tick: Ints1,
     rows: Ints1,
     dims: Ints1,
@@ -236,12 +238,13 @@ def forces_and_contact(
                     b, w, 1, dims, constants, rail_answer, rail_coupling, motion, rail_predicted, rail_force
                 )
                 uw.add_wheelset_force(b, w, -1.0, dims, wheelset_dof, wheelset_force, motion)
-                count = ct.solve_wheelset(
+                count = pt.solve_wheelset(
                     b, w, V, x, dx, left, right, channels, dims, constants, wheel, table, wheelset_compliance,
                     rail_coupling, contact, force, wheelset_force, rail_force, tolerance,
+                    patches,
                 )  # fmt: skip
                 uw.add_wheelset_force(b, w, 1.0, dims, wheelset_dof, wheelset_force, motion)
                 iterations_out[b, w] = ti.max(iterations_out[b, w], count)
                 if tick[at.LAST_PASS] == 1:
-                    ct.record_wheels(b, w, tick[at.STEP], contact, force, rail_force, wheel_record_out)
+                    pt.record_wheels(b, w, tick[at.STEP], contact, force, rail_force, wheel_record_out, patches)
             uw.add_rail_forces(b, dims, wheel_shape, rail_force, motion)

@@ -14,9 +14,10 @@ from tiengine.kernels import layout as at
 from tiengine.kernels.types import Array, Template
 
 # Contact state of a wheel: results of geometry and kinematics for the law and the force directions.
-(DELTA, XI_X, XI_Y, XI_S, SIN, COS, S_W, S_R, R_C, KH, K11, K22, K23, K33, SHIFT, Z_IRR, Y_IRR, RAIL_W, N_CONTACT) = (
-    range(19)
-)
+(
+    DELTA, XI_X, XI_Y, XI_S, SIN, COS, S_W, S_R, R_C, KH, K11, K22, K23, K33, SHIFT, Z_IRR, Y_IRR, RAIL_W, TILT,
+    N_CONTACT,
+) = range(20)  # fmt: skip
 
 THIRD_OF_EXPONENTS = 715094163 << 32
 """Two thirds of the bias of a double's exponent, less what makes the first cube root's error least."""
@@ -36,8 +37,8 @@ def catmull_rom(f: float):
 
 
 @ti.func
-def lookup(u: float, alpha: float, table: Array, constants: Array):
-    """All columns of the contact table at (u, alpha); outside the table its edge values are kept."""
+def lookup(u: float, alpha: float, table: Array, constants: Array, patch: Template):
+    """All columns of a patch of the contact table at (u, alpha); outside the table its edge values are kept."""
     x = (u - constants[at.TABLE_U0]) / constants[at.TABLE_DU]
     y = (alpha - constants[at.TABLE_ALPHA0]) / constants[at.TABLE_DALPHA]
     i = ti.min(ti.max(ti.cast(ti.floor(x), ti.i32), 1), table.shape[0] - 3)
@@ -49,7 +50,7 @@ def lookup(u: float, alpha: float, table: Array, constants: Array):
         for n in range(4):
             weight = wx[m] * wy[n]
             for column in ti.static(range(at.N_TABLE)):
-                value[column] += weight * table[i + m - 1, j + n - 1, column]
+                value[column] += weight * table[i + m - 1, j + n - 1, patch * at.N_TABLE + column]
     return value
 
 
@@ -68,6 +69,7 @@ def contact_state(
     rolls: int,
     table: Array,
     constants: Array,
+    patch: Template,
 ):
     """Penetration, creepages and geometry of one wheel.
 
@@ -81,10 +83,11 @@ def contact_state(
         rail: w, v, theta_x of the rail under the wheel [m, m, rad].
         rail_slope: Their d/ds.
         rail_rate: Their rates at constant s.
-        irregularity: Track channels at the wheelset, see ``layout``.
+        irregularity: Track channels at the wheelset, N_IRREGULARITY of them or, with shapes, N_FELT, see ``layout``.
         rolls: 1 if a cross level turns the railheads.
-        table: Contact geometry, shape (n_u, n_alpha, N_TABLE).
+        table: Contact geometry, shape (n_u, n_alpha, N_TABLE patches).
         constants: Numbers, see ``layout``.
+        patch: Slot of the table, 0 or 1.
     """
     h_r, b_i, y_r = constants[at.ARM_HEAD], constants[at.IRREGULARITY_HALF_BASE], constants[at.CROWN_OFFSET]
     w, v, theta_x = rail[0], rail[1], rail[2]
@@ -94,10 +97,15 @@ def contact_state(
     z_slope = irregularity[at.Z_V_SLOPE] + sigma * b_i * irregularity[at.CROSS_LEVEL_SLOPE]
     y_irr = irregularity[at.Y_A] + sigma * 0.5 * irregularity[at.GAUGE]
     y_slope = irregularity[at.Y_A_SLOPE] + sigma * 0.5 * irregularity[at.GAUGE_SLOPE]
+    of_left, of_right = 0.5 - 0.5 * sigma, 0.5 + 0.5 * sigma
+    if ti.static(irregularity.get_shape()[0] > at.N_IRREGULARITY):
+        z_irr += of_left * irregularity[at.RAIL_LEFT] + of_right * irregularity[at.RAIL_RIGHT]
+        z_slope += of_left * irregularity[at.RAIL_LEFT_SLOPE] + of_right * irregularity[at.RAIL_RIGHT_SLOPE]
+        z_slope -= of_left * irregularity[at.WHEEL_LEFT_SLOPE] + of_right * irregularity[at.WHEEL_RIGHT_SLOPE]
 
     u = sigma * ((x[0] - r0 * x[2]) - (v + h_r * theta_x + y_irr))
     alpha = sigma * (x[2] - theta_x - turn)
-    g = lookup(u, alpha, table, constants)
+    g = lookup(u, alpha, table, constants, patch)
     gamma = ti.atan2(g[at.TAN_GAMMA], 1.0)
     gamma_t = gamma - sigma * (theta_x + turn)
     c, s = ti.cos(gamma_t), ti.sin(gamma_t)
@@ -109,6 +117,8 @@ def contact_state(
         - (w + z_irr + sigma * (b0 - y_r + u) * theta_x + sigma * (b0 - b_i + u) * turn)
         - g[at.GAP]
     )
+    if ti.static(irregularity.get_shape()[0] > at.N_IRREGULARITY):
+        p += of_left * irregularity[at.WHEEL_LEFT] + of_right * irregularity[at.WHEEL_RIGHT]
 
     # Lateral: the material velocity of the rail head. Vertical: a wheel that follows the rail's shape rolls on it.
     across = (
@@ -145,6 +155,7 @@ def contact_state(
             z_irr,
             y_irr,
             w,
+            alpha,
         ]
     )
 

@@ -246,9 +246,10 @@ def make_bed(
         given_factors = np.random.default_rng(3).uniform(0.5, 1.0, (B, seat_count, 2))
         given_factors[:, seat_count // 2] = 0.0
         state.set_seat_factors(given_factors)
+    rows = at.CONTACT_ROWS[given.contact.patches]
     contact = Contact(
-        wheel=model.wheel, table=given.contact.values, contact=np.zeros((B, W, 2, N_CONTACT)),
-        force=np.zeros((B, W, 2, 4)), wheelset_force=np.zeros((B, W, 5)), rail_force=np.zeros((B, W, 2, 3)),
+        wheel=model.wheel, table=given.contact.values, contact=np.zeros((B, W, rows, N_CONTACT)),
+        force=np.zeros((B, W, rows, 4)), wheelset_force=np.zeros((B, W, 5)), rail_force=np.zeros((B, W, 2, 3)),
         iterations=np.zeros((B, W), dtype=np.int32),
     )  # fmt: skip
     contact.contact[..., COS] = 1.0
@@ -261,7 +262,7 @@ def make_bed(
     irregularity = np.zeros((B, steps, W, at.N_IRREGULARITY))
     for b in range(B):
         irregularity[b] = 1e-4 * np.random.default_rng((7, b)).standard_normal((steps, W, at.N_IRREGULARITY))
-    record = np.zeros((B, steps, W, 2, at.N_WHEEL))
+    record = np.zeros((B, steps, W, 2, at.N_WHEEL_RECORD[given.contact.patches]))
     body_record = np.zeros((B, steps, 3, train.n_dof))
     slab_record = aligned_zeros((B * steps * state.groups * state.slab_dofs * 2, 8))
     slab_bed = SlabBed(

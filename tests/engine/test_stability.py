@@ -6,11 +6,14 @@ import re
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from tiengine.engine.stability import Growth, of_trains, step_growth, with_stiffest_seats
 from tiengine.engine.time_step import prepare
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import load_scenario
+from tiengine.track.knots import Grading
+from tiengine.track.splines import Splines
 
 from ..models import V350, default_model
 
@@ -45,12 +48,29 @@ def test_nothing_grows_by_the_default_step():
     assert growth.rate < 0.0
 
 
-@pytest.mark.parametrize("factor", [2.0, 3.0])
-def test_stiffened_seats_grow_by_the_default_step(factor):
-    """Sound seats do not."""
+def test_stiffened_seats_grow_with_the_stand_in_of_sound_ones(monkeypatch):
+    """As it was: a stand-in for sound seats only."""
+    monkeypatch.setattr("tiengine.track.seat_passes.FACTORS", (1.0,))
+    monkeypatch.setattr("tiengine.track.seat_passes.CONTRACTION", np.inf)
     model = default_model()
-    stiff = default_model(**vars_of(with_stiffest_seats(model.ingredients, factor)))
+    stiff = default_model(**vars_of(with_stiffest_seats(model.ingredients, 3.0)))
     assert step_growth(stiff, V350, 1200).rate > 1e-3
+
+
+def test_growth_that_begins_hidden_is_found(monkeypatch):
+    """Rail that enters in the motion of the window's end feeds a mode there by 1e-3 a step, where nothing else moves.
+
+    A run with these settings ran away after 28 000 steps. In the energy of a track whose coefficients all begin with
+    the same velocity the mode came forth after 5000; and rail that enters at rest lets nothing grow.
+    """
+    grading = Grading(finest=0.05, coarsest=1.0 / 3.0)
+    settings = {"grading": grading, "dt": 5e-5, "length": 44.0, "passes": 3}
+    sound = step_growth(default_model(**settings), V350, 30000)
+    assert sound.tolerable(30000)
+    monkeypatch.setattr(Splines, "_entry", lambda self: sp.csr_array((self.count, self.count)))
+    growth = step_growth(default_model(**settings), V350, 30000)
+    assert not growth.tolerable(30000)
+    assert growth.rate > 1e-4
 
 
 def vars_of(ingredients) -> dict[str, object]:
@@ -65,26 +85,42 @@ def test_a_model_of_other_trains_differs_in_its_sizes_only():
     assert three.ingredients.trains == 3
 
 
-@pytest.mark.parametrize(("seats", "step"), [((100, 100, 3.0), 5e-5), ((0, 250, 2.0), 1e-4)])
+@pytest.mark.parametrize(
+    ("seats", "step"), [((100, 100, 3.0), 1e-4), ((100, 100, 10.0), 2.5e-5), ((0, 250, 2.0), 2e-4)]
+)
 def test_stiffened_seats_shorten_the_automatic_step(seats, step):
-    """Steps with which runs past such seats were found to end well; with the next longer ones they ran away."""
+    """Longest steps that are stable and whose wheel forces are within 0.3 % of those at 6.25e-6 s."""
     assert step_of(STIFF.format(*seats)) == step
 
 
 def test_seats_too_stiff_for_any_step_are_refused():
-    with pytest.raises(InputError, match=r"time_step = auto: unstable; .* stiffened by 10 .* choose smaller factors"):
-        step_of(STIFF.format(40, 41, 10.0))
+    """Entries that overlap multiply: 1000 times the sound stiffness."""
+    row = "{seats = [40, 41], factor = 10.0}"
+    with pytest.raises(InputError, match=r"time_step = auto: unstable; .* choose smaller factors"):
+        step_of(f"track.failed_fastenings=[{row}, {row}, {row}]")
+
+
+@pytest.mark.parametrize(("factor", "dt"), [(3.0, 1e-4), (10.0, 2.5e-5), (10.0, 1e-4)])
+def test_stiffened_seats_do_not_grow(factor, dt):
+    """The stand-in of the seats is that of the stiffest; sound seats beside them are as stable."""
+    model = default_model(dt=dt)
+    ingredients = with_stiffest_seats(model.ingredients, factor)
+    stiff = default_model(dt=dt, **vars_of(ingredients))
+    assert step_growth(stiff, V350, 1200).rate < 0.0
+    sound_too = default_model(dt=dt, designs=ingredients.designs)
+    assert sound_too.seats.factor == stiff.seats.factor > 1.0
+    assert step_growth(sound_too, V350, 1200).rate < 0.0
 
 
 def test_softened_seats_do_not():
     assert step_of(STIFF.format(60, 62, 0.0), distance=60.0) == 2e-4
 
 
-@pytest.mark.parametrize("overrides", [(STIFF.format(100, 100, 3.0),), ("numerics.passes=1",)], ids=["seat", "pass"])
+@pytest.mark.parametrize("overrides", [(STIFF.format(100, 100, 10.0),), ("numerics.passes=1",)], ids=["seat", "pass"])
 def test_advice_has_been_tried(overrides):
     """Whatever change a refusal names is then accepted, and no longer step of the automatic ones."""
     wanted = ("numerics.time_step=2e-4", *overrides)
-    with pytest.raises(InputError, match=r"unstable; an oscillation.* is stable$") as refused:
+    with pytest.raises(InputError, match=r"unstable; .* is stable$") as refused:
         step_of(*wanted)
     changes = re.findall(r"numerics\.(\w+) = ([\d.e-]+)(?= or| is)", str(refused.value))
     assert changes

@@ -1,11 +1,16 @@
 """Scan over settings: what the trial accepts does not grow in a march, whatever it refuses.
 
-One train rolls over a smooth track; an irregularity of 20 um in the first steps starts every oscillation there is.
+Two trains roll over the same smooth track. The track of one is disturbed, and an irregularity of 20 um lies under its
+wheels in the first steps. What counts is the largest acceleration by which rails and slabs differ, anywhere: neither
+the trial's measure nor its disturbance.
+
+Cases are a covering design: any three settings of the splines, any two of the sines, take every combination of their
+values.
 """
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -13,91 +18,109 @@ import pytest
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.kinds import make_stepper, state_at_rest
+from tiengine.engine.state import ACCELERATION, VELOCITY
+from tiengine.engine.stepper import Plan
 from tiengine.engine.time_step import prepare
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import load_scenario
 
+from .covering import covering
+
 PRESETS = ("default", "smooth", "paper", "train3", "train8", "braking", "defects")
-SPEEDS = (50.0, 200.0, 350.0, 500.0)  # km/h
-SEATS = (None, "{seats = [60, 60], factor = 3.0}", "{seats = [50, 150], factor = 2.0}", "{seats = [60, 62]}")
-FRICTION = (0.3, 0.02)
-PASSES = (1, 2, 3)
-KNOTS = ("{}", "{finest = 0.06, coarsest = 0.4}")  # the default, and finer ones
-DENSITIES = (6.5, 8.0, 10.0, 13.0)  # sines a metre
-WINDOWS = ("'auto'", "36.0")
-LENGTHS = (0.0, 0.15)  # m, of a seat
-STEPS = ("'auto'", "1e-4")
-
-SPLINES = [
+SPLINES = covering(
     {
-        "train.speed_kmh": speed,
-        "track.failed_fastenings": seats,
-        "track.friction": friction,
-        "numerics.passes": passes,
-        "numerics.knots": knots,
-    }
-    for speed, seats, friction, passes, knots in product(SPEEDS, SEATS, FRICTION, PASSES, KNOTS)
-]
-SINES = [
+        "train.speed_kmh": (50.0, 200.0, 350.0, 500.0),
+        "track.failed_fastenings": (
+            None,
+            "{seats = [60, 60], factor = 3.0}",
+            "{seats = [60, 61], factor = 10.0}",
+            "{seats = [50, 150], factor = 2.0}",
+            "{seats = [60, 62]}",
+        ),
+        "track.friction": (0.3, 0.02),
+        "numerics.passes": (1, 2, 3),
+        "numerics.knots": (None, "{finest = 0.06, coarsest = 0.4}", "{finest = 0.3, growth = 0.4, coarsest = 2.0}"),
+        "numerics.window": ("'auto'", "44.0"),
+        "numerics.time_step": ("'auto'", "2e-4", "5e-5"),
+    },
+    strength=3,
+)
+SINES = covering(
     {
-        "numerics.trial_functions": "'sines'",
-        "train.speed_kmh": speed,
-        "numerics.modes_per_metre": density,
-        "numerics.window": window,
-        "track.fastening": f"{{like = 'ACE2021', length = {length}}}",
-        "numerics.time_step": step,
-    }
-    for speed, density, window, length, step in product((350.0, 400.0), DENSITIES, WINDOWS, LENGTHS, STEPS)
-]
+        "train.speed_kmh": (350.0, 400.0),
+        "numerics.modes_per_metre": (6.5, 8.0, 10.0, 13.0),
+        "numerics.window": ("28.0", "36.0"),
+        "track.fastening": tuple(f"{{like = 'ACE2021', length = {length}}}" for length in (0.0, 0.15)),
+        "numerics.time_step": ("'auto'", "1e-4"),
+        "track.friction": (0.3, 0.02),
+    },
+    strength=2,
+)
 
-MARCHED = 6000
-"""Steps: what grows by less than a thousandth a step does so by 400 at most."""
+DISTANCE = 100.0  # m, for which the trial accepts
+PART = 1500
+"""Steps between measurements."""
+GROWTH = 2.0
+"""Tolerated from the second part to the third; the decay of what is damped has hidden less growth before."""
+FLOOR = 10.0
+"""m/s^2 that are added to both: contact forces are solved to 0.1 N, slopes of the rails have 0.05 kg m^2 a function."""
+LOOKED = 24  # steps at a part's end of which the largest counts
 STARTING = 40
 SIZE = 2e-5  # m
-
-
-def alternating(force):
-    """Amplitude of what alternates from step to step within eight steps, largest of all wheels, shape (windows,).
-
-    By seventh differences: a sine of six steps a period counts with a hundredth.
-    """
-    windows = force[: len(force) // 8 * 8].reshape(-1, 8, force[0].size)
-    return np.abs(np.diff(windows, n=7, axis=1)[:, 0]).max(axis=1) / 128.0
+VELOCITY_SIZE = 1e-4  # m/s
+TRACK = ("vertical", "lateral", "slabs")
 
 
 def growth(name: str, changes: dict[str, object]) -> float | None:
-    """Later over earlier amplitude of an oscillation, 10 N added to both; None if the step is refused."""
+    """Later over earlier difference of the trains' accelerations; None if the step is refused."""
     overrides = [f"{key}=[{value}]" if "failed" in key else f"{key}={value}" for key, value in changes.items() if value]
-    scenario = load_scenario(name, ["train.distance=150.0", "irregularity.spectrum='none'", *overrides])
+    scenario = load_scenario(name, [f"train.distance={DISTANCE}", "irregularity.spectrum='none'", *overrides])
     try:
-        model, _ = prepare(scenario)
+        model, _ = prepare(scenario, trains=2)
     except InputError as refused:
         assert "unstable" in str(refused)  # noqa: PT017 - only then is there nothing to march
         return None
     V, g = scenario.train.speed.fastest, model.ingredients
-    state, chunk = state_at_rest(model), Chunk.empty(g, MARCHED, 1)
+    state, chunk = state_at_rest(model), Chunk.empty(g, PART, 1)
     equilibrium(model, state, 0.0, V)
-    stepper = make_stepper(model, state, chunk)
+    random = np.random.default_rng(0)
+    for part in TRACK:
+        velocity = np.stack([state.part(train, part)[VELOCITY] for train in range(2)])
+        velocity[1] += VELOCITY_SIZE * random.standard_normal(velocity[1].shape)
+        state.put(VELOCITY, part, velocity)
     noise = np.zeros_like(chunk.irregularity)
-    random = np.random.default_rng(0).standard_normal((STARTING, noise.shape[2]))
-    noise[0, :STARTING, :, at.Z_V] = SIZE * random
-    noise[0, :STARTING, :, at.Y_A] = SIZE * random[:, ::-1]
-    stepper.load(g.newmark.dt * V * np.arange(1.0, MARCHED + 1.0), np.full(MARCHED, V), np.zeros(MARCHED), noise)
-    for i in range(MARCHED):
-        stepper.step(i, i)
-    forces = chunk.wheel[0, :MARCHED][..., [at.VERTICAL_FORCE, at.LATERAL_FORCE]]
-    assert np.isfinite(forces).all()
-    found = alternating(forces.reshape(MARCHED, -1))
-    third = len(found) // 3
-    earlier, later = (10.0 + np.median(part) for part in (found[third : 2 * third], found[2 * third :]))
-    return float(later / earlier)  # the blow at a defect or a joint is no growth: medians
+    for channel in (at.Z_V, at.Y_A):
+        noise[1, :STARTING, :, channel] = SIZE * random.standard_normal((STARTING, noise.shape[2]))
+    stepper, found = make_stepper(model, state, chunk), []
+    for part in range(3):
+        X = g.newmark.dt * V * (part * PART + np.arange(1.0, PART + 1.0))
+        stepper.load(X, np.full(PART, V), np.zeros(PART), noise if part == 0 else np.zeros_like(noise))
+        steps, none = np.arange(PART), np.full(PART, -1)
+        stepper.take(Plan(steps, none, none).part(0, PART - LOOKED))
+        found.append(FLOOR)
+        for i in range(PART - LOOKED, PART):
+            stepper.take(Plan(steps, none, none).part(i, i + 1))
+            apart = [state.part(1, part)[ACCELERATION] - state.part(0, part)[ACCELERATION] for part in TRACK]
+            assert all(np.isfinite(each).all() for each in apart)
+            found[-1] = max(found[-1], FLOOR + max(float(np.abs(each).max()) for each in apart))
+    return found[2] / found[1]
 
 
 def assert_steady(name: str, changes: dict[str, object]) -> None:
-    """Nothing accepted grows twofold within 2000 steps, beyond 10 N."""
+    """Nothing accepted grows."""
     found = growth(name, changes)
-    assert found is None or found < 2.0
+    assert found is None or found < GROWTH
+
+
+def test_every_combination_is_covered():
+    """Of any two of three factors, in fewer cases than the product."""
+    factors = {"a": (1, 2, 3), "b": "xyz", "c": (True, False)}
+    cases = covering(factors, 2)
+    for first, second in combinations(factors, 2):
+        for values in product(factors[first], factors[second]):
+            assert any((case[first], case[second]) == values for case in cases)
+    assert len(cases) < 18
 
 
 @pytest.mark.slow
@@ -105,7 +128,7 @@ def assert_steady(name: str, changes: dict[str, object]) -> None:
 def test_presets(name):
     found = growth(name, {})
     assert found is not None
-    assert found < 2.0
+    assert found < GROWTH
 
 
 @pytest.mark.slow

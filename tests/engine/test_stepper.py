@@ -44,6 +44,7 @@ class OtherState(State):
     normal_force = property(lambda self: self.load.transpose(2, 0, 1))
     forces_on_rails = property(lambda self: self.on_rail.transpose(3, 0, 1, 2))
     relative_shift = property(lambda self: self.shift.transpose(2, 0, 1))
+    relative_tilt = property(lambda self: np.zeros_like(self.relative_shift))
     seat_forces = property(lambda self: self.seats.transpose(3, 2, 1, 0))
 
     def body_motion(self, kind: int) -> NDArray[np.float64]:

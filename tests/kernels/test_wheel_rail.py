@@ -57,6 +57,7 @@ def test_lookup_is_the_tables(model: Model) -> None:
     theirs = [at.S_WHEEL, at.S_RAIL, at.RADIUS, at.HERTZ, at.C11, at.C22, at.C23, at.C33]
     np.testing.assert_allclose(contact[inside][:, columns], expected[inside][:, theirs], rtol=1e-11, atol=1e-16)
     np.testing.assert_allclose(contact[inside][:, wr.SHIFT], u[inside], atol=1e-16)
+    np.testing.assert_allclose(contact[:, wr.TILT], alpha, atol=1e-16)
     assert np.isfinite(contact).all()
     tangent = contact[inside][:, wr.SIN] / contact[inside][:, wr.COS]
     np.testing.assert_allclose(tangent, expected[inside][:, at.TAN_GAMMA], atol=1e-13)

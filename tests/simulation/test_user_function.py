@@ -22,8 +22,7 @@ SHORT = {
     "numerics.truncation": "none",
     "numerics.time_step": 2e-4,
     "output.precision": "double",
-    "irregularity.taper": 1e-3,  # the hill begins with a step of 1 mm:
-    "events.oscillation": "record",  # its blow lets the forces of the finest knots ring on at the step's frequency
+    "irregularity.taper": 1e-3,  # the hill begins with a step of 1 mm, whose ringing dies out
 }
 
 

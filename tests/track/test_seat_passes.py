@@ -79,6 +79,25 @@ def test_factors():
     assert least_factor(passes(5e6, length=0.0, operators=fine)) is None
 
 
+@pytest.mark.parametrize(("stiffest", "dt"), [(3.0, 2e-4), (10.0, 1e-4), (10.0, 2.5e-5)])
+def test_stiffened_seats_need_a_larger_stand_in(stiffest, dt):
+    """At least half of theirs, smeared; and its passes contract over sound seats, too."""
+    factor = least_factor(replace(passes(dt=dt), stiffest=stiffest))
+    assert factor >= 0.5 * stiffest
+    assert passes(dt=dt, factor=factor).contraction(0.3) < CONTRACTION
+
+
+def test_lag_is_what_a_pass_leaves_of_a_long_wave():
+    """A half sine over the whole window, on seats as smeared, without stiffness of the rail: closed form."""
+    assert passes(factor=1.0).lag == 0.0
+    given = passes(factor=8.0)
+    x = np.sin(np.pi * np.arange(GRADED.functions.count) / (GRADED.functions.count - 1.0))
+    M, A_s = given.operators.vertical(0.0)[0], given.smeared[0]
+    u = np.kron(x, [1.0, 0.0])
+    M, A_s = u @ M @ u, u @ A_s @ u
+    assert given.lag == pytest.approx((A_s - A_s / 8.0) / (M + A_s), rel=1e-6)
+
+
 def growth(given, lateral, steps=450):
     """Energy of free motion: peak in the last third over that in the second."""
     m = march(given, lateral, 2)

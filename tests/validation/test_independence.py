@@ -14,7 +14,7 @@ ALLOWED: dict[str, set[str] | None] = {
     "vehicle": None,
     "contact": None,
     "irregularity": None,
-    "kernels": {"contact", "layout", "step", "suspension", "under_wheels"},
+    "kernels": {"contact", "layout", "patches", "step", "suspension", "under_wheels"},
     "kernels.types": None,
     "kernels.wheel_rail": None,
     # parameters, and numbers that both must agree on

@@ -21,13 +21,22 @@ from tiengine.contact.profile import Profile
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 
-__all__ = ["Contacts", "find_contacts", "transverse_curvature"]
+__all__ = ["Contacts", "SecondContacts", "find_contacts", "find_second_contacts", "transverse_curvature"]
 
 STATION_STEP = 0.2e-3
 CANDIDATE_BAND = 10e-6
 """Grid maxima this far [m] below the best are refined too, twice what 0.2 mm misses at a 1:15 corner."""
 
 ROWS_AT_ONCE = 256  # keeps the arrays of the grid search in the cache
+
+NEAR, FAR = 4e-3, 8e-3
+"""Minima of the gap closer together than the first [m] are one patch, further apart than the second are two."""
+LOW_RIDGE, HIGH_RIDGE = 5e-6, 10e-6
+"""Minima between which the gap rises by less than the first [m] above the higher one are one patch: a wheel load closes
+it many times over. From the second on they are two. CONTACT finds one patch over both minima of S1002's tread on
+60E1, 3 um deep and 9 mm apart, at 10 kN, and may find two at the flange root, where the ridge has 26 um."""
+DEEP, DEEPEST = 0.15e-3, 0.2e-3
+"""A second minimum this much above the first [m] is out of reach: at the second, wholly, no wheel load closes it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +98,80 @@ def find_contacts(wheel: Profile, rail: Profile, offset: float, u: ArrayLike, al
     )
 
 
+@dataclass(frozen=True, eq=False)
+class SecondContacts:
+    """Second minima of the gap, arrays of shape (n,).
+
+    Attributes:
+        share: Part of a patch's forces that the second minimum has as a patch of its own: 0 for none, up to 1.
+        at: Contact there; the first one's where there is none.
+    """
+
+    share: Reals
+    at: Contacts
+
+
+def find_second_contacts(
+    wheel: Profile, rail: Profile, offset: float, u: Reals, alpha: Reals, first: Contacts
+) -> SecondContacts:
+    """The lowest minimum of the gap that is a patch beside the first one, for each outward shift and tilt.
+
+    Args:
+        wheel: Wheel profile.
+        rail: Canted rail profile, origin at its crown.
+        offset: Outward position of the tape circle from the crown at u = 0 [m].
+        u: Outward shifts [m], shape (n,).
+        alpha: Outward tilts [rad], shape (n,).
+        first: Contacts found there, shape (n,).
+    """
+    shift = u + offset
+    case, station = _candidates(wheel, rail, shift, alpha, DEEPEST)
+    apart = np.abs(station - first.s_w[case]) > 0.5 * NEAR
+    case, station = case[apart], station[apart]
+    if case.size == 0:
+        return SecondContacts(np.zeros_like(u), first)
+    ridge = _ridges(wheel, rail, shift[case], alpha[case], station, first.s_w[case])
+    station = _refine(wheel, rail, shift[case], alpha[case], station)
+    o, z = _placed(wheel, shift[case], alpha[case], station)
+    gap = rail.height(o) - z
+    distance = np.hypot(o - first.s_r[case], rail.height(o) - rail.height(first.s_r[case]))
+    share = (
+        _rise(distance, NEAR, FAR)
+        * _rise(ridge - gap, LOW_RIDGE, HIGH_RIDGE)
+        * (1.0 - _rise(gap - first.gap[case], DEEP, DEEPEST))
+    )
+    order = np.lexsort((-gap, share > 0.0, case))
+    best = order[np.append(np.diff(case[order]) > 0, True)]  # the lowest that is a patch
+    best = best[share[best] > 0.0]
+    parts = (gap, station, o, wheel.height(station), -rail.height(o, 1))
+    found = [getattr(first, name).copy() for name in ("gap", "s_w", "s_r", "dz_w", "tan_gamma")]
+    shares = np.zeros_like(u)
+    shares[case[best]] = share[best]
+    for target, part in zip(found, parts, strict=True):
+        target[case[best]] = part[best]
+    return SecondContacts(shares, Contacts(*found))
+
+
+def _rise(x: Reals, low: float, high: float) -> Reals:
+    """From 0 at ``low`` to 1 at ``high``, level at both."""
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+def _ridges(wheel: Profile, rail: Profile, u: Reals, alpha: Reals, one: Reals, other: Reals) -> Reals:
+    """Largest gap between two stations of a wheel [m], shape (n,); infinite where the wheel leaves the rail between."""
+    part = np.linspace(0.0, 1.0, int(30e-3 / STATION_STEP))
+    first, last = rail.span
+    highest = np.empty_like(u)
+    for start in range(0, u.size, ROWS_AT_ONCE):
+        rows = slice(start, start + ROWS_AT_ONCE)
+        s = one[rows, None] + (other[rows] - one[rows])[:, None] * part
+        o, z = _placed(wheel, u[rows, None], alpha[rows, None], s)
+        gap = np.where((o < first) | (o > last), np.inf, rail.height(np.clip(o, first, last)) - z)
+        highest[rows] = gap.max(axis=1)
+    return highest
+
+
 def transverse_curvature(wheel: Profile, rail: Profile, contacts: Contacts, span: float) -> Reals:
     """Mean transverse curvature of the gap over a patch of half width ``span``.
 
@@ -116,8 +199,10 @@ def _placed(wheel: Profile, u: Reals, alpha: Reals, s: Reals) -> tuple[Reals, Re
     return u + s * np.cos(alpha) - z_w * np.sin(alpha), s * np.sin(alpha) + z_w * np.cos(alpha)
 
 
-def _candidates(wheel: Profile, rail: Profile, u: Reals, alpha: Reals) -> tuple[NDArray[np.intp], Reals]:
-    """Cases and stations of the grid maxima of F that may be the largest; u and alpha of shape (n,)."""
+def _candidates(
+    wheel: Profile, rail: Profile, u: Reals, alpha: Reals, band: float = CANDIDATE_BAND
+) -> tuple[NDArray[np.intp], Reals]:
+    """Cases and stations of the grid maxima of F within a band below the largest; u and alpha of shape (n,)."""
     first, last = wheel.span
     s = np.linspace(first, last, int((last - first) / STATION_STEP) + 2)
     lower, upper = rail.span
@@ -130,7 +215,7 @@ def _candidates(wheel: Profile, rail: Profile, u: Reals, alpha: Reals) -> tuple[
         F = z - np.interp(o, fine, head, left=np.inf, right=np.inf)
         best = F.max(axis=1, keepdims=True)
         inner = F[:, 1:-1]
-        peak = (inner >= F[:, :-2]) & (inner > F[:, 2:]) & (inner > best - CANDIDATE_BAND)
+        peak = (inner >= F[:, :-2]) & (inner > F[:, 2:]) & (inner > best - band)
         row, column = np.nonzero(peak)
         cases.append(row + start)
         stations.append(s[column + 1])

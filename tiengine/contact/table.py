@@ -12,18 +12,26 @@ arcs of a drawn profile join.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 from scipy.ndimage import correlate1d
 
 from tiengine.contact.hertz import hertz, zhai_G
 from tiengine.contact.kalker import kalker
 from tiengine.contact.profile import Profile
-from tiengine.contact.search import Contacts, find_contacts, transverse_curvature
+from tiengine.contact.search import (
+    Contacts,
+    SecondContacts,
+    find_contacts,
+    find_second_contacts,
+    transverse_curvature,
+)
+from tiengine.contact.slot_geometry import raw_slots, smoothed_slots
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
@@ -38,6 +46,8 @@ SMALLEST_CURVATURE = 0.02
 """Floor of the transverse curvature [1/m], a 25 m radius: profiles that fit closely over the whole patch."""
 FLANGE_DEPTH = 10e-3
 """Depth below the tape circle where a flange's thickness is measured [m]."""
+SPIN_SHARE = 0.01
+"""Least share of which the spin moment takes account; p^-1/3 has no bound."""
 LARGEST_CLEARANCE = 40e-3
 """Largest clearance of a flange [m]: 22 mm thick, worn, on a track 20 mm wide."""
 
@@ -68,6 +78,7 @@ class ContactSettings(Params):
         float, Q("rad", "largest tilt; a wheel on its flange rolls the wheelset by up to 10 mrad", gt=0, le=0.1)
     ] = 12e-3
     dalpha: Annotated[float, Q("rad", "step in alpha", gt=0)] = 0.25e-3
+    patches: Annotated[Literal[1, 2], Field(description="contact patches a wheel can have")] = 1
 
     def axis(self, axis: Literal["u", "alpha"]) -> Reals:
         """Nodes of the table: the range and one more at each end, for the outer point of the interpolation.
@@ -93,7 +104,7 @@ class ContactTable:
         du: Step of u [m].
         alpha_min: First node of alpha [rad], one step before the range.
         dalpha: Step of alpha [rad].
-        values: Shape (n_u, n_alpha, 10), C-contiguous; the last axis as in :attr:`COLUMNS`.
+        values: Shape (n_u, n_alpha, 10 patches), C-contiguous; the last axis as in :attr:`COLUMNS`, patch by patch.
         crown_offset: Distance of the rails' crowns from the track's centre, y_r [m].
         settings: Settings the table was built with.
     """
@@ -119,6 +130,11 @@ class ContactTable:
         "c33": "m^2/N^(1/3)",  # f33 = c33 N^(4/3)
     }
 
+    @property
+    def patches(self) -> int:
+        """Contact patches a wheel can have."""
+        return self.settings.patches
+
     def lookup(self, u: ArrayLike, alpha: ArrayLike) -> Reals:
         """Catmull-Rom interpolation, continuous with its slope.
 
@@ -129,7 +145,7 @@ class ContactTable:
             alpha: Outward tilts [rad].
 
         Returns:
-            Shape (..., 10) in the order of :attr:`COLUMNS`.
+            Shape (..., 10 patches) in the order of :attr:`COLUMNS`, patch by patch.
         """
         x, y = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(alpha, dtype=np.float64))
         i, weight_u = _taps((x - self.u_min) / self.du, self.values.shape[0])
@@ -191,6 +207,15 @@ class WheelRailPair:
         found = find_contacts(self.wheel, self.canted_rail, offset, u, alpha)
         return Contacts(found.gap - datum, found.s_w, found.s_r, found.dz_w, found.tan_gamma)
 
+    def second_contacts(self, u: Reals, alpha: Reals, first: Contacts) -> SecondContacts:
+        """Second patches beside the first contacts [m], arrays of shape (n,); the gap is as in :meth:`contacts`."""
+        offset = self.settings.half_spacing - self.crown_offset
+        datum = find_contacts(self.wheel, self.canted_rail, offset, 0.0, 0.0).gap
+        found = find_second_contacts(
+            self.wheel, self.canted_rail, offset, u, alpha, replace(first, gap=first.gap + datum)
+        )
+        return replace(found, at=replace(found.at, gap=found.at.gap - datum))
+
 
 def build_contact_table(wheel: Profile, rail: Profile, settings: ContactSettings) -> ContactTable:
     """Tabulate the contact of a wheel and a rail.
@@ -208,11 +233,14 @@ def build_contact_table(wheel: Profile, rail: Profile, settings: ContactSettings
     """
     pair = WheelRailPair(wheel, rail, settings)
     u, alpha = settings.axis("u"), settings.axis("alpha")
-    gap, s_w, s_r, dz_w, tan_gamma, B = _smoothed_geometry(pair, u, alpha)
-    r_c = settings.wheel_radius + dz_w
-    creep = _creep_columns(tan_gamma, r_c, B, settings)
     origin = np.argmin(np.abs(u)), np.argmin(np.abs(alpha))
-    values = np.concatenate([np.stack([gap - gap[origin], s_w, s_r, r_c, tan_gamma], axis=-1), creep], axis=-1)
+    if settings.patches == 1:
+        geometry = _smoothed_geometry(pair, u, alpha)
+        values = _columns(geometry, None, geometry[0][origin], settings)
+    else:
+        slots, shares, gap = _slots(pair, u, alpha)
+        columns = [_columns(slots[k], shares[k], gap[origin], settings) for k in range(2)]
+        values = np.concatenate(columns, axis=-1)
     return ContactTable(
         u_min=float(u[0]),
         du=settings.du,
@@ -224,16 +252,61 @@ def build_contact_table(wheel: Profile, rail: Profile, settings: ContactSettings
     )
 
 
-def _smoothed_geometry(pair: WheelRailPair, u: Reals, alpha: Reals) -> Reals:
-    """Gap, s_w, s_r, radius less r0, tan gamma, transverse curvature on the nodes, (6, n_u, n_alpha).
+def _columns(geometry: Reals, share: Reals | None, datum: float, settings: ContactSettings) -> Reals:
+    """Columns of one patch, shape (n_u, n_alpha, 10).
 
-    Contacts are also computed beyond the ends of u, over the reach of the Gaussian.
+    A share p of the forces N = K delta^1.5, f11 N^-2/3 = c11 and so on is that of p K, p^1/3 c11, p^1/3 c22, c23,
+    p^-1/3 c33, so that the kernels need not know it.
+
+    Args:
+        geometry: See :func:`_smoothed_geometry`.
+        share: Shares of the forces, shape (n_u, n_alpha); None for 1 throughout.
+        datum: Gap at (0, 0) [m].
+        settings: Radius and material.
     """
-    sigma, du = pair.settings.smoothing, pair.settings.du
+    gap, s_w, s_r, dz_w, tan_gamma, B = geometry
+    r_c = settings.wheel_radius + dz_w
+    creep = _creep_columns(tan_gamma, r_c, B, settings)
+    if share is not None:
+        part = np.cbrt(share)
+        spin = 1.0 / np.cbrt(np.maximum(share, SPIN_SHARE))
+        creep = creep * np.stack([share, part, part, np.ones_like(share), spin], axis=-1)
+    return np.concatenate([np.stack([gap - datum, s_w, s_r, r_c, tan_gamma], axis=-1), creep], axis=-1)
+
+
+def _fine_axis(settings: ContactSettings, u: Reals) -> tuple[Reals, int, Reals]:
+    """Shifts at which contacts are searched [m], of which every so many is a node, and the weights of the smoothing.
+
+    They reach beyond the ends of u by the Gaussian's reach.
+    """
+    sigma, du = settings.smoothing, settings.du
     finer = max(1, int(np.ceil(du * STEPS_PER_SIGMA / sigma - 1e-9))) if sigma > 0.0 else 1
     step = du / finer
     reach = int(np.ceil(GAUSSIAN_REACH * sigma / step))
     fine = u[0] + step * np.arange(-reach, (u.size - 1) * finer + reach + 1)
+    kernel = np.exp(-0.5 * (step * np.arange(-reach, reach + 1) / sigma) ** 2) if reach > 0 else np.ones(1)
+    return fine, finer, kernel / kernel.sum()
+
+
+def _slots(pair: WheelRailPair, u: Reals, alpha: Reals) -> tuple[Reals, Reals, Reals]:
+    """Geometry of both slots, as :func:`_smoothed_geometry` has it, their shares, and the gap of the lower minimum."""
+    fine, finer, kernel = _fine_axis(pair.settings, u)
+    shift, tilt = (grid.ravel() for grid in np.meshgrid(fine, alpha, indexing="ij"))
+    geometry, share, lowest = raw_slots(pair, shift, tilt, pair.settings.curvature_span)
+    geometry[:, 5] = np.maximum(geometry[:, 5], SMALLEST_CURVATURE)
+    grid = (fine.size, alpha.size)
+    smooth, shares, gap = smoothed_slots(
+        geometry.reshape(2, 6, *grid), share.reshape(2, *grid), lowest.reshape(grid), kernel
+    )
+    reach = len(kernel) // 2
+    inside = slice(reach, fine.size - reach, finer)
+    return smooth[:, :, inside], shares[:, inside], gap[inside]
+
+
+def _smoothed_geometry(pair: WheelRailPair, u: Reals, alpha: Reals) -> Reals:
+    """Gap, s_w, s_r, radius less r0, tan gamma, transverse curvature on the nodes, (6, n_u, n_alpha)."""
+    fine, finer, kernel = _fine_axis(pair.settings, u)
+    reach = len(kernel) // 2
     found = pair.contacts(fine[:, None], alpha[None, :])
     flat = Contacts(*(part.ravel() for part in (found.gap, found.s_w, found.s_r, found.dz_w, found.tan_gamma)))
     B = transverse_curvature(pair.wheel, pair.canted_rail, flat, pair.settings.curvature_span)
@@ -241,8 +314,7 @@ def _smoothed_geometry(pair: WheelRailPair, u: Reals, alpha: Reals) -> Reals:
     raw = np.stack([found.gap, found.s_w, found.s_r, found.dz_w, found.tan_gamma, B])
     if reach == 0:
         return raw
-    kernel = np.exp(-0.5 * (step * np.arange(-reach, reach + 1) / sigma) ** 2)
-    smooth: Reals = correlate1d(raw, kernel / kernel.sum(), axis=1)
+    smooth: Reals = correlate1d(raw, kernel, axis=1)
     return smooth[:, reach : raw.shape[1] - reach : finer]
 
 

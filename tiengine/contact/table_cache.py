@@ -17,7 +17,7 @@ from zipfile import BadZipFile
 import numpy as np
 import scipy
 
-from tiengine.contact import hertz, kalker, profile, smoothing
+from tiengine.contact import branches, hertz, kalker, profile, slot_geometry, smoothing
 from tiengine.contact import search as contact_search
 from tiengine.contact import table as contact_geometry
 from tiengine.contact.profile import Profile
@@ -26,7 +26,9 @@ from tiengine.parameters.cache_folders import table_folder
 
 __all__ = ["contact_table"]
 
-MODULES: tuple[ModuleType, ...] = (contact_geometry, contact_search, hertz, kalker, profile, smoothing)
+MODULES: tuple[ModuleType, ...] = (
+    contact_geometry, contact_search, branches, slot_geometry, hertz, kalker, profile, smoothing,
+)  # fmt: skip
 FIELDS = ("u_min", "du", "alpha_min", "dalpha", "crown_offset")
 
 

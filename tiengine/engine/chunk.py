@@ -19,8 +19,8 @@ class Chunk:
 
     Attributes:
         clock: Window at the end of each step, shape (steps, N_CLOCK).
-        irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
-        wheel: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL).
+        irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
+        wheel: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL_RECORD).
         body: Recorded displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
         slab: Displacement and velocity of the slabs' coordinates, with the bodies, shape (B, rows, 2, slots, dofs).
         rear_slab: Rear slab in memory then, shape (rows,); slab i is in slot i modulo their number.
@@ -44,8 +44,8 @@ class Chunk:
         W, bodies, rows, slots = len(train.wheelset_x), len(train.body_names), max(body_rows, 1), ingredients.slots
         return cls(
             clock=np.zeros((steps, at.N_CLOCK)),
-            irregularity=np.zeros((B, steps, W, at.N_IRREGULARITY)),
-            wheel=np.zeros((B, steps, W, 2, at.N_WHEEL)),
+            irregularity=np.zeros((B, steps, W, ingredients.channels)),
+            wheel=np.zeros((B, steps, W, 2, at.N_WHEEL_RECORD[ingredients.contact.patches])),
             body=np.zeros((B, rows, 3, 5 * bodies)),
             slab=np.zeros((B, rows, 2, slots, ingredients.designs.matrices[0].n)),
             rear_slab=np.zeros(rows, dtype=np.int64),

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
 from tiengine.engine.steady import Track, steady_track
 from tiengine.engine.window import window_clock
-from tiengine.kernels import contact as kernels
 from tiengine.kernels import layout as at
+from tiengine.kernels import patches as kernels
 from tiengine.kernels.wheel_rail import N_CONTACT
 from tiengine.model.constant_data import Model
 from tiengine.parameters.errors import InputError
@@ -42,8 +42,8 @@ class ContactForces:
     """Results of the contact kernel; B trains, W wheelsets.
 
     Attributes:
-        contact: Contact states, shape (B, W, 2, N_CONTACT).
-        local: N, Fx, Fy, Mz on the wheels, shape (B, W, 2, 4).
+        contact: Contact states, shape (B, W, CONTACT_ROWS, N_CONTACT), see ``layout``.
+        local: N, Fx, Fy, Mz on the wheels, shape (B, W, CONTACT_ROWS, 4).
         wheelset: Forces on y, z, roll, pitch, yaw, shape (B, W, 5).
         rail: Forces on w, v, theta_x, shape (B, W, 2, 3).
     """
@@ -73,10 +73,13 @@ def evaluate_contact(
         rail_motion: w, v, theta_x, slopes, rates at constant s, shape (B, W, 2, 9).
     """
     B, W = wheelset_u.shape[:2]
+    patches = model.ingredients.contact.patches
+    rows = at.CONTACT_ROWS[patches]
     out = ContactForces(
-        np.zeros((B, W, 2, N_CONTACT)), np.zeros((B, W, 2, 4)), np.zeros((B, W, 5)), np.zeros((B, W, 2, 3))
+        np.zeros((B, W, rows, N_CONTACT)), np.zeros((B, W, rows, 4)), np.zeros((B, W, 5)), np.zeros((B, W, 2, 3))
     )
     kernels.wheel_forces(
+        patches,
         V,
         int(model.dims[at.CROSS_LEVEL_ROLLS]),
         model.constants,
@@ -200,7 +203,7 @@ class _Problem:
         out = np.broadcast_to(self.load, x.shape) - x @ self.train.K.T
         out = out - self.spread(rates) @ (self.train.C + self.V * self.train.C_speed).T
         out[:, self.train.wheelset_dof] += found.wheelset
-        if self.model.ingredients.given:
+        if self.model.ingredients.given or self.train.element_between_cars.any():
             out += self._beyond_linear(x, rates)
         return np.hstack([out, (found.rail - force).reshape(len(y), -1)])
 
@@ -303,7 +306,8 @@ class _Problem:
         train, dof = self.train, self.train.wheelset_dof
         load = float(self.model.constants[at.STATIC_LOAD])
         centre = self.model.ingredients.contact.lookup(np.array(0.0), np.array(0.0))
-        approach = (load / centre[at.HERTZ]) ** (2.0 / 3.0)
+        hertz = centre[at.HERTZ :: at.N_TABLE].max()  # of the slot that is not empty there
+        approach = (load / hertz) ** (2.0 / 3.0)
         stiffness = 1.5 * load / approach
         K = train.K.copy()
         f = self.load.copy()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
 from tiengine.kernels import layout as at
-from tiengine.kernels.wheel_rail import COS, N_CONTACT, SHIFT
+from tiengine.kernels.wheel_rail import COS, N_CONTACT, SHIFT, TILT
 from tiengine.model.sine_model import SineModel
 from tiengine.parameters.arrays import Reals
 
@@ -61,6 +61,7 @@ class SineState(State):
         B, n, seats, W = int(d[at.TRAINS]), int(d[at.MODES]), int(d[at.SEATS]), int(d[at.WHEELSETS])
         slots, dofs, vehicle = int(d[at.SLOTS]), int(d[at.SLAB_DOFS]), int(d[at.VEHICLE_DOFS])
         columns = int(d[at.VEHICLES]) + B * vehicle
+        rows = at.CONTACT_ROWS[model.ingredients.contact.patches]
         blocks = {
             "vertical": (slice(0, int(d[at.LATERAL])), (B, 2, 2 * n)),
             "lateral": (slice(int(d[at.LATERAL]), int(d[at.SLABS])), (B, 2, 3 * n)),
@@ -74,8 +75,8 @@ class SineState(State):
             design=np.zeros((B, slots), dtype=np.int32),
             seat_force=np.zeros((B, 2, 3, seats)),
             pressure=np.zeros((B, slots, 2)),
-            contact=_first_contact(B, W),
-            force=np.zeros((B, W, 2, 4)),
+            contact=_first_contact(B, W, rows),
+            force=np.zeros((B, W, rows, 4)),
             wheelset_force=np.zeros((B, W, 5)),
             rail_force=np.zeros((B, W, 2, 3)),
             iterations=np.zeros((B, W), dtype=np.int32),
@@ -96,7 +97,7 @@ class SineState(State):
     @property
     def normal_force(self) -> Reals:
         """Normal force of every wheel [N], shape (B, W, 2)."""
-        return self.force[..., 0]
+        return self.force[..., :2, 0]
 
     @property
     def forces_on_rails(self) -> Reals:
@@ -106,7 +107,12 @@ class SineState(State):
     @property
     def relative_shift(self) -> Reals:
         """Outward shift of every wheel against its rail [m], shape (B, W, 2)."""
-        return self.contact[..., SHIFT]
+        return self.contact[..., :2, SHIFT]
+
+    @property
+    def relative_tilt(self) -> Reals:
+        """Outward tilt of every wheel against its rail [rad], shape (B, W, 2)."""
+        return self.contact[..., TILT]
 
     @property
     def seat_forces(self) -> Reals:
@@ -172,7 +178,7 @@ class SineState(State):
                 self.view(row, block)[train] = 0.0
         for forces in (self.seat_force, self.pressure, self.force, self.wheelset_force, self.rail_force):
             forces[train] = 0.0
-        self.contact[train] = _first_contact(1, self.contact.shape[1])[0]
+        self.contact[train] = _first_contact(1, *self.contact.shape[1:3])[0]
 
     def enter(self, first_seat: int, first_slab: int) -> None:
         """Move the window on to its rear seat and slab: drop the slabs that it leaves, bring new ones in at rest."""
@@ -191,8 +197,8 @@ class SineState(State):
             self.first_slab = first_slab
 
 
-def _first_contact(B: int, W: int) -> NDArray[np.float64]:
+def _first_contact(B: int, W: int, rows: int) -> NDArray[np.float64]:
     """Contact states with a level contact plane, for the first force directions."""
-    contact = np.zeros((B, W, 2, N_CONTACT))
+    contact = np.zeros((B, W, rows, N_CONTACT))
     contact[..., COS] = 1.0
     return contact

@@ -149,8 +149,8 @@ class SineStepper(Stepper):
         """Forces of the seats on the slabs as right-hand sides, shape (B slots, 5 seats a slab)."""
         return self.scratch.slab_force.reshape(len(self._acceleration["slabs"]), -1)
 
-    def _launch(self, kernel: Any, *arrays: NDArray[Any]) -> Launch:
-        launch = Launch(kernel, (self._parallel,), arrays, public=self._public)
+    def _launch(self, kernel: Any, *arrays: NDArray[Any], static: tuple[Any, ...] = ()) -> Launch:
+        launch = Launch(kernel, (self._parallel, *static), arrays, public=self._public)
         self._launches.append(launch)
         return launch
 
@@ -184,6 +184,7 @@ class SineStepper(Stepper):
             train.element_linear, train.element_table, table, chunk.irregularity, m.wheel_shape, b.wheelset_compliance,
             b.rail_coupling, b.rail_answer, b.vehicle_answer, s.motion, s.seat_force, k.slab_force, k.rail_predicted,
             s.contact, s.force, s.wheelset_force, s.rail_force, s.iterations, chunk.wheel,
+            static=(self.ingredients.contact.patches,),
         )  # fmt: skip
 
     def _bind_mortar(self, number: int) -> Launch:

@@ -18,10 +18,11 @@ from tiengine.engine.spline_arrays import SplineArrays
 from tiengine.engine.spline_step import Bed, Contact
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
 from tiengine.engine.vector_mode import VectorLaunch, lanes_for
+from tiengine.kernels import layout
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels import spline_seats as seats
 from tiengine.kernels.spline_squares import squares_kernel
-from tiengine.kernels.wheel_rail import COS, N_CONTACT, SHIFT
+from tiengine.kernels.wheel_rail import COS, N_CONTACT, SHIFT, TILT
 from tiengine.model.spline_model import SplineModel
 from tiengine.parameters.arrays import Reals
 
@@ -60,14 +61,15 @@ class SplineState(State):
         """
         g, tables = model.ingredients, ModelTables.of(model)
         B, W = g.trains, len(g.wheel_s)
+        rows = layout.CONTACT_ROWS[g.contact.patches]
         held = SplineArrays.at_rest(
             B, lanes or lanes_for(B), model.functions.count, g.seats, W, g.slots, tables.slabs, tables.cars
         )
         wheels = Contact(
             wheel=model.wheel,
             table=g.contact.values,
-            contact=_first_contact(B, W),
-            force=np.zeros((B, W, 2, 4)),
+            contact=_first_contact(B, W, rows),
+            force=np.zeros((B, W, rows, 4)),
             wheelset_force=np.zeros((B, W, 5)),
             rail_force=np.zeros((B, W, 2, 3)),
             iterations=np.zeros((B, W), dtype=np.int32),
@@ -96,7 +98,7 @@ class SplineState(State):
     @property
     def normal_force(self) -> Reals:
         """Normal force of every wheel [N], shape (B, W, 2)."""
-        return self.wheels.force[..., 0]
+        return self.wheels.force[..., :2, 0]
 
     @property
     def forces_on_rails(self) -> Reals:
@@ -106,7 +108,12 @@ class SplineState(State):
     @property
     def relative_shift(self) -> Reals:
         """Outward shift of every wheel against its rail [m], shape (B, W, 2)."""
-        return self.wheels.contact[..., SHIFT]
+        return self.wheels.contact[..., :2, SHIFT]
+
+    @property
+    def relative_tilt(self) -> Reals:
+        """Outward tilt of every wheel against its rail [rad], shape (B, W, 2)."""
+        return self.wheels.contact[..., TILT]
 
     @property
     def seat_forces(self) -> Reals:
@@ -199,7 +206,7 @@ class SplineState(State):
         wheels = self.wheels
         for forces in (self.bed.pressure, wheels.force, wheels.wheelset_force, wheels.rail_force):
             forces[train] = 0.0
-        wheels.contact[train] = _first_contact(1, wheels.contact.shape[1])[0]
+        wheels.contact[train] = _first_contact(1, *wheels.contact.shape[1:3])[0]
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """All arrays that the coming steps depend on, by name."""
@@ -233,8 +240,8 @@ class SplineState(State):
             self.first_slab = first_slab
 
 
-def _first_contact(B: int, W: int) -> Reals:
+def _first_contact(B: int, W: int, rows: int) -> Reals:
     """Contact states with a level contact plane, for the first force directions."""
-    contact = np.zeros((B, W, 2, N_CONTACT))
+    contact = np.zeros((B, W, rows, N_CONTACT))
     contact[..., COS] = 1.0
     return contact

@@ -43,10 +43,10 @@ class Contact:
     """Arrays that the contact solve reads and leaves, shapes as ``engine.sine_state`` and ``model.model`` have them.
 
     Attributes:
-        wheel: r0, b0, spin inertia, shape (W, 3).
-        table: Contact geometry, shape (n_u, n_alpha, N_TABLE).
-        contact: Contact states, shape (B, W, 2, N_CONTACT).
-        force: N, Fx, Fy, Mz on the wheels, shape (B, W, 2, 4).
+        wheel: Numbers of each wheelset, shape (W, N_WHEEL_NUMBERS).
+        table: Contact geometry, shape (n_u, n_alpha, N_TABLE patches).
+        contact: Contact states, shape (B, W, CONTACT_ROWS, N_CONTACT).
+        force: N, Fx, Fy, Mz on the wheels, shape (B, W, CONTACT_ROWS, 4).
         wheelset_force: On y, z, roll, pitch, yaw, shape (B, W, 5).
         rail_force: On w, v, theta_x, shape (B, W, 2, 3).
         iterations: Most Newton iterations, shape (B, W).
@@ -59,6 +59,11 @@ class Contact:
     wheelset_force: Floats
     rail_force: Floats
     iterations: Ints
+
+    @property
+    def patches(self) -> int:
+        """Patches a wheel can have."""
+        return int(self.table.shape[2]) // layout.N_TABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +133,8 @@ class SplineStep:
             suspension: Nonlinear elements.
             contact: Arrays of the contact.
             clock: Window at the end of each step, shape (steps, N_CLOCK).
-            irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
-            wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL).
+            irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
+            wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL_RECORD).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
             slab_record: Displacement, then velocity of every slab coordinate where the bodies are recorded, vectors,
                 shape (B rows groups N 2, 8).
@@ -164,9 +169,10 @@ class SplineStep:
         )  # fmt: skip
         vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, slab_record,
                    state.car, cars.columns, car_load)  # fmt: skip
+        shaped = int(irregularity.shape[-1] > layout.N_IRREGULARITY)
         self.launch = VectorLaunch(
             step_kernel,
-            (state.lanes, slabs.half_width, cars.blocks),
+            (state.lanes, slabs.half_width, cars.blocks, contact.patches, shaped),
             arrays,
             frozenset(i for i, array in enumerate(arrays) if any(array is vector for vector in vectors)),
         )

@@ -64,6 +64,11 @@ class State(ABC):
 
     @property
     @abstractmethod
+    def relative_tilt(self) -> Reals:
+        """Outward tilt of every wheel against its rail [rad], shape (B, W, 2); a view that stays valid."""
+
+    @property
+    @abstractmethod
     def seat_forces(self) -> Reals:
         """Forces of the rails on the seats: down [N], to the right [N] and roll moment about the rail's axis [N m].
 

@@ -92,7 +92,14 @@ KINDS = (
     Kind(
         "contact",
         "Contact positions",
-        "Contact should stay on the tread; a second peak near the flange root (negative positions) is flange contact.",
+        "Contact should stay on the tread; a second peak near the flange root (negative positions) is flange contact."
+        " Filled: the second patch, where wheels may have two.",
+    ),
+    Kind(
+        "revolution",
+        "Wheels out of round",
+        "Peaks of the force that follow the tread, revolution after revolution, come from the wheel; the black line is"
+        " the tread, much enlarged. Where the grey band reaches the middle, the wheel has lost contact.",
     ),
     Kind(
         "ride",

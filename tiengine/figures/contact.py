@@ -1,4 +1,4 @@
-"""Contact positions on wheels and rails: shares of time along the profiles."""
+"""Contact positions on wheels and rails: shares of time along the profiles, of both patches where wheels have two."""
 
 from __future__ import annotations
 
@@ -24,13 +24,16 @@ __all__ = ["draw"]
 
 BIN = 0.25e-3  # m along the profile
 MARGIN = 4e-3  # m beyond the outermost contact
+LEAST_SHARE = 0.01
+"""Part of a wheel's normal force from which one of its two patches counts."""
 
 
 @of_one_train
 def draw(train: Train) -> Figure:
     """Draw histograms of the contact positions of all left and all right wheels above the profile they touch.
 
-    Samples at which a wheel is off the rail are left out, and so is the run-in of every wheelset.
+    Samples at which a wheel is off the rail are left out, and so is the run-in of every wheelset. If wheels have two
+    patches, both count where they carry load, and the second one is filled in.
 
     Args:
         train: The train.
@@ -39,15 +42,24 @@ def draw(train: Train) -> Figure:
         AbsentError: The file holds no contact positions, or all wheels of one side are off the rail throughout.
     """
     names = {"contact_position_wheel": "wheel", "contact_position_rail": "rail"}
-    samples = train.samples("wheel", "normal_force", *names)
+    two = train.scenario.contact.patches == 2
+    samples = train.samples("patch" if two else "wheel", "share" if two else "normal_force", *names)
     parts, cant = train.scenario.parts, train.scenario.track.cant
     profiles = {"wheel": parts.wheel, "rail": parts.rail_profile.canted(cant)}
     counts = {name: _Histogram(profiles[body].span) for name, body in names.items()}
+    seconds = {name: _Histogram(profiles[body].span) for name, body in names.items()} if two else {}
     begin = first_samples(train, samples)
     sample = int(begin.min())
     for _, channels in samples.slices(sample):
-        counted = (sample + np.arange(len(channels["normal_force"])))[:, None] >= begin
+        counted = (sample + np.arange(len(channels["contact_position_wheel"])))[:, None] >= begin
         sample += len(counted)
+        if two:
+            carrying = (channels["share"] >= LEAST_SHARE) & counted[..., None, None]
+            for name, histogram in counts.items():
+                for patch in range(2):
+                    histogram.add(channels[name][..., patch], carrying[..., patch])
+                seconds[name].add(channels[name][..., 1], carrying[..., 1])
+            continue
         touching = (channels["normal_force"] > 0.0) & counted[..., None]
         for name, histogram in counts.items():
             histogram.add(channels[name], touching)
@@ -55,16 +67,19 @@ def draw(train: Train) -> Figure:
         raise AbsentError(
             f"{train.result.name}: the wheels of one side never touch the rail: there is no contact to draw"
         )
-    figure = new_figure(15.0, f"{train.caption}: contact positions of all wheels while in contact, run-in left out")
+    words = "positions of both patches of all wheels" if two else "contact positions of all wheels while in contact"
+    figure = new_figure(15.0, f"{train.caption}: {words}, run-in left out")
     axes = figure.subplots(4, 1, height_ratios=(1.1, 1.0, 1.1, 1.0))
     for (name, body), (above, below) in zip(names.items(), (axes[:2], axes[2:]), strict=True):
-        _histograms(above, counts[name])
+        second = seconds.get(name)
+        _histograms(above, counts[name], second)
         origin = "the tape circle" if body == "wheel" else "the crown"
-        _profile(below, profiles[body], counts[name], f"outward from {origin} of the {body} [mm]")
+        _profile(below, profiles[body], counts[name], second, f"outward from {origin} of the {body} [mm]")
         below.sharex(above)
         above.set_xlim(*(1e3 * edge for edge in counts[name].shown(profiles[body].span)))
         above.set(
-            title=plain(f"{body.capitalize()}: {profiles[body].name}"), ylabel=f"share of time\n[% in {1e3 * BIN:g} mm]"
+            title=plain(f"{body.capitalize()}: {profiles[body].name}"),
+            ylabel=f"share of {'patches' if two else 'time'}\n[% in {1e3 * BIN:g} mm]",
         )
     axes[0].legend(loc="upper right")
     return figure
@@ -115,15 +130,18 @@ class _Histogram:
         return float(self.edges[np.searchsorted(running, 0.5)] + 0.5 * BIN)
 
 
-def _histograms(axes: Axes, histogram: _Histogram) -> None:
+def _histograms(axes: Axes, histogram: _Histogram, second: _Histogram | None) -> None:
     for side, look, label in ((0, LEFT, "left wheels"), (1, RIGHT, "right wheels")):
         axes.stairs(histogram.share[side], 1e3 * histogram.edges, label=label, linewidth=0.9,
                     edgecolor=look.color, linestyle=look.linestyle)  # fmt: skip
+        if second is not None:
+            axes.stairs(100.0 * second.counts[side] / histogram.total[side], 1e3 * second.edges, fill=True, alpha=0.3,
+                        color=look.color, label=f"{label}, second patch")  # fmt: skip
     axes.set_ylim(bottom=0.0)
 
 
-def _profile(axes: Axes, profile: Profile, histogram: _Histogram, abscissa: str) -> None:
-    """Draw the profile around its touched part, which is bold; triangles mark the medians."""
+def _profile(axes: Axes, profile: Profile, histogram: _Histogram, second: _Histogram | None, abscissa: str) -> None:
+    """Draw the profile around its touched part, which is bold; triangles mark the medians, open ones second patches."""
     low, high = histogram.touched
     y = np.linspace(*histogram.shown(profile.span), 800)
     inside = (y >= low) & (y <= high)
@@ -132,6 +150,10 @@ def _profile(axes: Axes, profile: Profile, histogram: _Histogram, abscissa: str)
     for side, look, marker in ((0, LEFT, "v"), (1, RIGHT, "^")):
         middle = histogram.middle(side)
         axes.plot(1e3 * middle, 1e3 * float(profile.height(middle)), marker, color=look.color, markersize=6)
+        if second is not None and second.total[side]:
+            middle = second.middle(side)
+            axes.plot(1e3 * middle, 1e3 * float(profile.height(middle)), marker, color=look.color, markersize=7,
+                      markerfacecolor="none")  # fmt: skip
     axes.set(xlabel=abscissa, ylabel="down [mm],\nstretched")
     axes.margins(y=0.2)
     axes.invert_yaxis()

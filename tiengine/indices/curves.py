@@ -23,7 +23,7 @@ from tiengine.indices.filters import sliding_mean
 from tiengine.indices.index import Index, no_limit, worst
 from tiengine.indices.ride import Forces, Ride
 from tiengine.indices.zones import ZONES, Stretch, Zone, stretches
-from tiengine.parameters.arrays import Reals
+from tiengine.parameters.arrays import Flags, Reals
 from tiengine.parameters.conventions import GRAVITY
 
 __all__ = ["nadal_limit", "wear_regime", "wheel_indices"]
@@ -200,8 +200,8 @@ def _wear_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
         )  # fmt: skip
 
 
-def _in_curves(ride: Ride, position: Reals) -> Reals:
-    """Samples at which a wheelset is in a curve of constant radius, shape (n,), bool."""
+def _in_curves(ride: Ride, position: Reals) -> Flags:
+    """Samples at which a wheelset is in a curve of constant radius, shape (n,)."""
     kept = np.zeros(len(position), dtype=np.bool_)
     if ride.line is not None and len(position):
         for stretch in stretches(ride.line, float(position[0]), float(position[-1])):

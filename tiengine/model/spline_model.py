@@ -58,6 +58,7 @@ def build_spline_model(ingredients: Ingredients, V: float) -> SplineModel:
         newmark.beta_dt2,
         newmark.gamma_dt,
         V,
+        stiffest=float(ingredients.designs.seat_scale.max()),
     )
     factor = least_factor(seats)
     if factor is None:

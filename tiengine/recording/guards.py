@@ -65,7 +65,7 @@ class Watch:
         wheels = (trains, wheelsets, 2)
         return cls(
             lifted=np.zeros(wheels),
-            last=np.full((4, *wheels), -np.inf),
+            last=np.full((5, *wheels), -np.inf),
             ended=np.zeros(trains, dtype=np.bool_),
             oscillation=StepOscillation.none(trains, wheelsets),
         )
@@ -114,8 +114,11 @@ class Guard:
         self.every = max(int(EVERY / self._dt + 1e-9), 1)
         self._look_every = StepOscillation.interval(self._dt)
         self._shift, self._normal = self.state.relative_shift, self.state.normal_force
+        self._tilt = self.state.relative_tilt
         self._static_load = float(static_wheel_loads(self._train).max())
         table = ingredients.contact
+        # the first node and the last are beyond the range
+        self._steepest_tilt, self._innermost = -table.alpha_min - table.dalpha, table.u_min + table.du
         self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
         self._wheel_front = float(self._train.wheelset_x.max())
         self._nearest_end = float(self.track_end.min())
@@ -162,6 +165,8 @@ class Guard:
             self.watch.lifted[:], self._flying = 0.0, False
         if self._shift.max() > self._climb:
             self._climbs(step, time, position)
+        if np.abs(self._tilt).max() > self._steepest_tilt or self._shift.min() < self._innermost:
+            self._leaves_table(step, time, position)
         if position + self._wheel_front > self._nearest_end:
             self._track_ends(step, time, position)
 
@@ -180,6 +185,16 @@ class Guard:
         self._report_wheels(1, climbs, step, time, position, words)
         words = f"derailed: lateral shift beyond {self._derailed * 1e3:.1f} mm on the flange side"
         self._report_wheels(0, self._shift > self._derailed, step, time, position, words)
+
+    def _leaves_table(self, step: int, time: float, position: float) -> None:
+        """Report wheels that keep the geometry of the table's edge."""
+        touching = self._normal > 0.0
+        words = (
+            f"keeps the contact geometry of its table's edge: tilt beyond {self._steepest_tilt * 1e3:.3g} mrad or shift"
+            f" below {self._innermost * 1e3:.1f} mm"
+        )
+        beyond = (np.abs(self._tilt) > self._steepest_tilt) | (self._shift < self._innermost)
+        self._report_wheels(4, touching & beyond, step, time, position, words)
 
     def _oscillates(self, i: int, time: float, position: float) -> None:
         """Report wheels whose forces alternate from step to step, up to row ``i`` of the chunk."""
@@ -271,6 +286,6 @@ def climbing_shift(table: ContactTable) -> float:
     Args:
         table: Contact geometry.
     """
-    slope = table.values[:, table.values.shape[1] // 2, at.TAN_GAMMA]
+    slope = table.values[:, table.values.shape[1] // 2, at.TAN_GAMMA :: at.N_TABLE].max(axis=1)
     steep = np.flatnonzero(slope >= STEEPEST * slope.max())
     return float(table.u_min + min(int(steep[-1]) + 1, len(slope) - 2) * table.du)

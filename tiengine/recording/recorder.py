@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.stepper import Plan
 from tiengine.kernels import layout as at
-from tiengine.result_files.channels import MORTAR
+from tiengine.result_files.channels import MORTAR, PATCH
 from tiengine.result_files.layout import DTYPES, Block, GroupSpec, TrainLabels
 from tiengine.scenario.scenario import Scenario
 from tiengine.vehicle.train import TrainModel
@@ -37,6 +37,17 @@ WHEEL_COLUMNS = {
     "spin_moment": at.SPIN_MOMENT,
 }
 IRREGULARITY_COLUMNS = {"vertical": at.IRREGULARITY_VERTICAL, "lateral": at.IRREGULARITY_LATERAL}
+PATCH_COLUMNS = {
+    "normal_force": at.PATCH_NORMAL_FORCE,
+    "contact_position_wheel": at.PATCH_POSITION_WHEEL,
+    "contact_position_rail": at.PATCH_POSITION_RAIL,
+    "contact_angle": at.PATCH_ANGLE,
+    "longitudinal_creepage": at.PATCH_LONGITUDINAL_CREEPAGE,
+    "lateral_creepage": at.PATCH_LATERAL_CREEPAGE,
+    "spin_creepage": at.PATCH_SPIN_CREEPAGE,
+    "longitudinal_creep_force": at.PATCH_LONGITUDINAL_CREEP_FORCE,
+    "lateral_creep_force": at.PATCH_LATERAL_CREEP_FORCE,
+}
 BODY_ROWS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 
@@ -106,8 +117,10 @@ class Recorder:
     def groups_of(scenario: Scenario) -> dict[str, GroupSpec]:
         """Groups that each train of a scenario records."""
         out = scenario.output
+        patches = {"patch": GroupSpec.standard("patch", tuple(PATCH), times_of="wheel")}
         return {
             "wheel": GroupSpec.standard("wheel", out.wheel_channels),
+            **(patches if scenario.contact.patches == 2 else {}),
             "body": GroupSpec.standard("body", out.body_channels),
             "irregularity": GroupSpec.standard("irregularity", out.irregularity_channels, times_of="wheel"),
             "mortar": GroupSpec.standard("mortar", tuple(MORTAR), times_of="body"),
@@ -171,8 +184,10 @@ class Recorder:
         motion = {name: body[:, BODY_ROWS[name]].reshape(shape) for name in out.body_channels}
         largest, smallest = samples.pressure[:bodies, :, 0], samples.pressure[:bodies, :, 1]
         bed = {"slab": samples.slab[:bodies], "largest_pressure": largest, "smallest_pressure": smallest}
+        patches = {"patch": self._cast(at_wheels, _patches(wheel))} if self.scenario.contact.patches == 2 else {}
         return {
             "wheel": self._cast(at_wheels, forces),
+            **patches,
             "irregularity": self._cast(at_wheels, irregularity),
             "body": self._cast(at_bodies, motion),
             "mortar": self._cast(at_bodies, bed),
@@ -185,6 +200,17 @@ class Recorder:
 
     def _steps(self, interval: float | str) -> int:
         return 1 if isinstance(interval, str) else max(1, round(interval / self.dt))
+
+
+def _patches(wheel: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Channels of the patches from the wheels' output, shape (rows, W, 2, 2 patches) each."""
+    each = wheel[..., at.N_WHEEL :].reshape(*wheel.shape[:-1], 2, at.N_PATCH)
+    found = {name: each[..., column] for name, column in PATCH_COLUMNS.items()}
+    total = found["normal_force"].sum(axis=-1, keepdims=True)
+    found["share"] = found["normal_force"] / np.where(total > 0.0, total, 1.0)
+    along = found["longitudinal_creep_force"] * found["longitudinal_creepage"]
+    found["wear_number"] = np.abs(along) + np.abs(found["lateral_creep_force"] * found["lateral_creepage"])
+    return {name: found[name] for name in PATCH}
 
 
 def _slabs_held(first: NDArray[np.float64], slots: int) -> NDArray[np.float64]:

@@ -4,6 +4,11 @@ A step that is unstable by a little lets the forces alternate from one step to t
 before anything runs away. Real motion does not look so: the irregularity must be resolved by eight steps a wave, and
 the waves of an impact die out. So a few successive steps are looked at once in 20 ms: of an alternating force the sum
 of squared second differences is four times that of first differences, of a sine with eight steps a period 0.6 times.
+
+Nor is an oscillation that dies out an instability: after a blow, a step of the track of a millimetre, fine knots ring
+on near the step's frequency for some tenths of a second, since average acceleration does not damp them, and beat
+meanwhile. So the largest amplitudes of successive stretches of 0.1 s are compared: only what has grown since it was
+least, or is large and has not abated, counts.
 """
 
 from __future__ import annotations
@@ -30,14 +35,17 @@ LEAST = 0.01
 """Amplitude over the static wheel load from which an oscillation counts: forces are wrong by as much."""
 
 LASTING = 0.1
-"""Time that an oscillation must last [s]: the waves of an impact die out in less. Windows without it count back: seats
-that pass modulate an oscillation."""
+"""Time of windows with an oscillation, less that of windows without, that makes a stretch [s]: seats that pass modulate
+an oscillation. As much time without it, and it has ended."""
 
 GROWTH = 1.5
-"""Growth of the amplitude meanwhile."""
+"""Growth of the largest amplitude from one stretch to a later one."""
 
 LARGE = 0.2
 """Amplitude over the static wheel load that needs no further growth: friction bounds what is saturated."""
+
+STEADY = 0.98
+"""Largest amplitude of such a one over that of an earlier stretch: of what dies out it is less."""
 
 
 @dataclass(eq=False)
@@ -45,18 +53,20 @@ class StepOscillation:
     """Looks at vertical and lateral wheel forces; B trains, W wheelsets. Its arrays are part of a checkpoint.
 
     Attributes:
-        lasted: How long each wheel's force has alternated, less how long it has not [s], shape (B, W, 2).
-        began: Amplitude when it began [N], same shape.
+        lasted: How long each wheel's force has alternated in this stretch, less how long not [s], shape (B, W, 2).
+        largest: Largest amplitude in this stretch [N], same shape.
+        least: Least of those of earlier stretches of the same oscillation [N], same shape; infinite before.
     """
 
     lasted: Reals
-    began: Reals
+    largest: Reals
+    least: Reals
 
     @classmethod
     def none(cls, trains: int, wheelsets: int) -> StepOscillation:
         """Nothing oscillates yet."""
         wheels = (trains, wheelsets, 2)
-        return cls(np.zeros(wheels), np.zeros(wheels))
+        return cls(np.zeros(wheels), np.zeros(wheels), np.full(wheels, np.inf))
 
     @staticmethod
     def interval(dt: float) -> int:
@@ -82,9 +92,14 @@ class StepOscillation:
             sizes = np.where(alternates, 0.25 * np.sqrt(squares), 0.0)  # +A, -A, +A differ by 4 A
         size = sizes.max(axis=-1)
         going = size > LEAST * static_load
-        fresh = going & (self.lasted == 0.0)
-        self.began[fresh] = size[fresh]
         self.lasted += np.where(going, interval, -interval)
-        np.maximum(self.lasted, 0.0, out=self.lasted)
-        grown = (size > GROWTH * self.began) | (size > LARGE * static_load)
-        return going & (self.lasted > LASTING) & grown, size
+        np.maximum(self.largest, np.where(going, size, 0.0), out=self.largest)
+        ended = (self.lasted <= -LASTING) | ((self.largest == 0.0) & np.isinf(self.least))
+        complete = self.lasted > LASTING - 0.5 * interval
+        large = (self.largest > LARGE * static_load) & (self.largest > STEADY * self.least)
+        found = complete & np.isfinite(self.least) & ((self.largest > GROWTH * self.least) | large)
+        size = np.where(found, self.largest, size)
+        self.least[complete] = np.minimum(self.least, self.largest)[complete]
+        self.least[ended] = np.inf
+        self.lasted[complete | ended], self.largest[complete | ended] = 0.0, 0.0
+        return found, size

@@ -1,5 +1,7 @@
 """Contact geometry of a wheel on a rail, for ``tiengine contact``: rolling radii, conicity, contact points.
 
+Where the right wheel has a second patch beside its contact, that is stated and drawn too.
+
 The wheelset is shifted laterally on straight track (:mod:`tiengine.contact.conicity`). Conicity is that of harmonic
 linearisation, with the wheelset's roll, or that of EN 15302, by integrating the motion without roll.
 """
@@ -50,6 +52,8 @@ class ContactReport:
         wheel_station: Contact on the right wheel, outward from the tape circle [m], shape (n,).
         rail_station: Contact on the right rail, outward from its crown [m], shape (n,).
         contact_angle: Inclination of the right contact, positive where the rail falls inward [rad], shape (n,).
+        second_depth: Penetration of the right contact from which a second patch touches [m], NaN for none, shape (n,).
+        second_wheel_station, second_rail_station: Place of that patch [m], NaN likewise.
         amplitude: Amplitudes A [m], shape (k,).
         conicity: Equivalent conicity at A, shape (k,).
         method: How conicity is computed, a key of :data:`METHODS`.
@@ -62,6 +66,9 @@ class ContactReport:
     wheel_station: Reals
     rail_station: Reals
     contact_angle: Reals
+    second_depth: Reals
+    second_wheel_station: Reals
+    second_rail_station: Reals
     amplitude: Reals
     conicity: Reals
     method: Method = "harmonic"
@@ -78,6 +85,16 @@ class ContactReport:
             difference = float(np.interp(A, self.shift, self.radius_difference))
             value = f"rolling-radius difference {difference * 1e3:.3f} mm, conicity {conicity:.4f}"
             rows.append((f"{A * 1e3:g} mm", value))
+        two = np.flatnonzero(np.isfinite(self.second_depth) & (self.shift > 0.0))
+        if two.size:
+            low, high = self.shift[two[[0, -1]]] * 1e3
+            easiest = two[np.argmin(self.second_depth[two])]
+            rows.append((
+                "second patch",
+                f"right wheel, y = {low:.2f} to {high:.2f} mm; at {self.shift[easiest] * 1e3:.2f} mm both touch"
+                f" from {self.second_depth[easiest] * 1e6:.0f} um on,"
+                f" {abs(self.second_wheel_station[easiest] - self.wheel_station[easiest]) * 1e3:.1f} mm apart",
+            ))  # fmt: skip
         return rows
 
     def to_json(self) -> str:
@@ -94,6 +111,8 @@ class ContactReport:
         }
         names = ("shift", "radius_difference", "roll", "wheel_station", "rail_station", "contact_angle")
         content |= {name: getattr(self, name).tolist() for name in (*names, "amplitude", "conicity")}
+        for name in ("second_depth", "second_wheel_station", "second_rail_station"):
+            content[name] = [None if np.isnan(value) else value for value in getattr(self, name).tolist()]
         return json.dumps(content, indent=1)
 
 
@@ -119,6 +138,8 @@ def contact_report(
     shift: Reals = SHIFT_STEP * np.arange(-half, half + 1, dtype=np.float64)
     take_position, conicity, _ = METHODS[method]
     position = take_position(pair, shift)
+    second = pair.second_contacts(shift - settings.wheel_radius * position.roll, position.roll, position.right)
+    there = np.where(second.share > 0.0, 1.0, np.nan)
     amplitude: Reals = 0.5e-3 * np.arange(1, int(largest / 0.5e-3 + 1e-9) + 1, dtype=np.float64)
     return ContactReport(
         pair=pair,
@@ -128,6 +149,9 @@ def contact_report(
         wheel_station=position.right.s_w,
         rail_station=position.right.s_r,
         contact_angle=np.arctan(position.right.tan_gamma),
+        second_depth=there * (second.at.gap - position.right.gap),
+        second_wheel_station=there * second.at.s_w,
+        second_rail_station=there * second.at.s_r,
         amplitude=amplitude,
         conicity=conicity(pair, amplitude),
         method=method,
@@ -201,7 +225,10 @@ def _draw_angle(axes: Axes, report: ContactReport) -> None:
 
 
 def _draw_profiles(axes: Axes, report: ContactReport) -> None:
-    """Draw the right wheel lifted off its rail, to scale, with lines between contact points every millimetre."""
+    """Draw the right wheel lifted off its rail, to scale, with lines between contact points every millimetre.
+
+    Second patches are drawn at every shift at which there is one.
+    """
     pair, lift = report.pair, 14.0
     offset = (pair.settings.half_spacing - pair.crown_offset) * 1e3
     s, o = np.linspace(*pair.wheel.span, 600), np.linspace(*pair.canted_rail.span, 600)
@@ -218,6 +245,14 @@ def _draw_profiles(axes: Axes, report: ContactReport) -> None:
             labelled = ends[0]
             label = f"{report.shift[i] * 1e3:.0f}"
             axes.annotate(label, (ends[0], heights[0]), (0, 5), textcoords="offset points", ha="center", fontsize=7)
+    two = np.isfinite(report.second_depth)
+    if two.any():
+        wheels, rails = report.second_wheel_station[two], report.second_rail_station[two]
+        ends_y = np.stack([offset + wheels * 1e3, rails * 1e3])
+        ends_z = np.stack([pair.wheel.height(wheels) * 1e3 - lift, pair.canted_rail.height(rails) * 1e3])
+        axes.plot(ends_y, ends_z, "o-", color=GREEN, markersize=1.5, linewidth=0.4)
+        axes.plot([], [], color=GREEN, label="second patch")
+        axes.legend(fontsize="small")
     axes.set(xlabel="outward from the rail's crown [mm]", ylabel="down [mm]", aspect="equal")
     axes.set_title("right wheel, drawn above its rail; contacts at shifts y [mm]", fontsize="small")
     axes.invert_yaxis()

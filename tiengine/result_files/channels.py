@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 __all__ = [
     "BODY", "DEFLECTION", "DIRECTIONS", "DOFS", "GAUGE_FORCE", "GAUGE_MOTION", "GROUPS", "IRREGULARITY", "MORTAR",
-    "SEATS", "SLABS", "WHEEL", "Channel",
+    "PATCH", "SEATS", "SLABS", "WHEEL", "Channel",
 ]  # fmt: skip
 
 
@@ -45,6 +45,26 @@ WHEEL = {
     "lateral_creep_force": Channel("N", "lateral creep force on the wheel, in the contact plane"),
     "spin_moment": Channel("N m", "spin creep moment on the wheel about the contact normal"),
 }
+
+PATCH = {
+    "normal_force": Channel("N", "normal force of the patch"),
+    "share": Channel(
+        "1", "part of the wheel's normal force that the patch carries, zero when the wheel has lifted off"
+    ),
+    "contact_position_wheel": Channel("m", "position of the patch on the wheel, outward from the tape circle"),
+    "contact_position_rail": Channel("m", "position of the patch on the rail, outward from the crown"),
+    "contact_angle": Channel(
+        "rad", "inclination of the patch to the track's plane, positive where the rail falls inward"
+    ),
+    "longitudinal_creepage": Channel("1", "longitudinal creepage in the patch"),
+    "lateral_creepage": Channel("1", "lateral creepage in the plane of the patch"),
+    "spin_creepage": Channel("1/m", "spin creepage in the patch"),
+    "longitudinal_creep_force": Channel("N", "longitudinal creep force of the patch on the wheel"),
+    "lateral_creep_force": Channel("N", "lateral creep force of the patch on the wheel, in the plane of the patch"),
+    "wear_number": Channel("N", "T gamma of the patch: creep forces times creepages, along and across, without spin"),
+}
+"""Channels of the two patches of a wheel, with ``contact.patches = 2``; those of a patch that does not touch hold the
+geometry and creepages it would have, with zero forces."""
 
 BODY = {
     "displacement": Channel("m, m, rad, rad, rad", "displacement of the body: y, z, roll, pitch, yaw"),
@@ -108,6 +128,7 @@ GAUGE_FORCE = {
 
 GROUPS = {
     "wheel": WHEEL,
+    "patch": PATCH,
     "body": BODY,
     "irregularity": IRREGULARITY,
     "mortar": MORTAR,

@@ -26,7 +26,10 @@ COLUMNS = {
     EVENT: ("i4", Channel("1", "number of the event")),
     "time": ("f8", Channel("s", "time")),
     "position": ("f8", Channel("m", "chainage of the first vehicle's centre")),
-    "kind": (TEXT, Channel("1", "derailment, flange_climb, wheel_lift, oscillation, track_end or runaway")),
+    "kind": (
+        TEXT,
+        Channel("1", "derailment, flange_climb, wheel_lift, oscillation, contact_range, track_end or runaway"),
+    ),
     "wheelset": ("i4", Channel("1", "wheelset, 1 leads; 0 if the event concerns none")),
     "side": (TEXT, Channel("1", "left, right or empty")),
     "message": (TEXT, Channel("1", "description")),

@@ -52,6 +52,7 @@ AXES = {axis.name: axis for axis in (TIME, SEAT, SLAB)}
 
 DIMENSIONS = {
     "wheel": ("time", "wheelset", "side"),
+    "patch": ("time", "wheelset", "side", "patch"),
     "irregularity": ("time", "wheelset", "side"),
     "body": ("time", "body", "dof"),
     "mortar": ("time", "slot"),
@@ -99,6 +100,7 @@ class TrainLabels:
                 Channel("1", "wheelset, 1 leads"),
             ),
             "side": (list(SIDES), Channel("1", "side of the track, looking forward")),
+            "patch": (np.arange(1, 3, dtype=np.int32), Channel("1", "patch of a wheel, 1 nearer the field side")),
             "body": (list(self.bodies), Channel("1", "body of the train")),
             "dof": (list(DOFS), Channel("1", "degree of freedom of a body")),
             "slot": (np.arange(self.slots, dtype=np.int32), Channel("1", "slot of a slab in the window")),

@@ -208,6 +208,10 @@ class Reader:
         """Contact quantities of all wheels; channels have shape (time, wheelset, side)."""
         return self.group("wheel", train)
 
+    def patch(self, train: int = 0) -> dict[str, NDArray[Any]]:
+        """Patches of all wheels if ``contact.patches`` is 2; channels have shape (time, wheelset, side, patch)."""
+        return self.group("patch", train)
+
     def body(self, train: int = 0) -> dict[str, NDArray[Any]]:
         """Motion of all bodies; channels have shape (time, body, dof)."""
         return self.group("body", train)

@@ -33,4 +33,5 @@ def contact_settings(scenario: Scenario, train: TrainModel) -> ContactSettings:
         nu=parts.rail.nu,
         hertz=scenario.contact.hertz,
         smoothing=scenario.contact.smoothing,
+        patches=scenario.contact.patches,
     )

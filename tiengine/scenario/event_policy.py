@@ -16,7 +16,9 @@ class Events(Params):
         derailment: A wheel has left the contact table on the flange side; forces are no longer valid.
         flange_climb: The contact has passed the steepest part of the flange.
         wheel_lift: A wheel is unloaded for ``wheel_lift_time``.
-        oscillation: Wheel forces alternate from step to step for 0.1 s: the time step is unstable.
+        oscillation: Wheel forces alternate from step to step and grow, or stay large: the time step is unstable.
+        contact_range: A wheel is tilted beyond the contact table, or shifted beyond it on the field side: it keeps the
+            geometry of the table's edge.
         track_end: The leading wheel reaches the end of a measured track; the track is smooth beyond it.
     """
 
@@ -24,5 +26,6 @@ class Events(Params):
     flange_climb: Policy = "record"
     wheel_lift: Policy = "record"
     oscillation: Policy = "stop"
+    contact_range: Policy = "record"
     track_end: Policy = "record"
     wheel_lift_time: Annotated[float, Q("s", "time a wheel must be off its rail", ge=1e-3, le=10.0)] = 0.05

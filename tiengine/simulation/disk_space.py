@@ -84,7 +84,7 @@ def _rows(train: Scenario, group: str) -> float:
     dt = USUAL_STEP if step == "auto" else float(step)
     distance, time = train.train.distance, duration(train)
     match group.partition("/")[0]:
-        case "wheel" | "irregularity":
+        case "wheel" | "patch" | "irregularity":
             return time / _interval(out.wheel_interval, dt)
         case "body" | "mortar":
             return time / _interval(out.body_interval, dt)
@@ -106,6 +106,7 @@ def _length(train: Scenario, group: str, dimension: str) -> int:
         "body": sum(len(vehicle.body) for vehicle in vehicles),
         "dof": len(DOFS),
         "side": len(SIDES),
+        "patch": 2,
         "direction": len(DIRECTIONS),
         "slot": slab.slots(train.window_length, train.numerics.slab_count == "cover"),
         "point": len(window_points(train.window_length)),

@@ -3,7 +3,9 @@ r"""Matrices of one rail in the moving window from any trial functions: a Timosh
 The inertia of a field of mass density mu is mu (d2u/dt2 - 2 V du'/dt + V^2 u'' - dV/dt u'), projected on the trial
 functions f of the field (MODEL §1):
 
-    M = mu int f f,    C = -2 V mu int f f',    K = K_el - mu (V^2 int f' f' + dV/dt int f f')
+    M = mu int f f,    C = V mu ([f f](l) - 2 int f f'),    K = K_el - mu (V^2 int f' f' + dV/dt int f f')
+
+[f f](l) stands for rail that enters at rest (``trial_functions``), with splines only.
 
 | symbol | meaning |
 |---|---|
@@ -135,7 +137,12 @@ class RailOperators:
         M = _diagonal([mu * f.values for mu, f in fields])
         flow = _diagonal([mu * f.flow for mu, f in fields])
         softening = _diagonal([mu * f.slopes for mu, f in fields])
-        return M, sp.csr_array(-2.0 * V * flow), sp.csr_array(interleaved(K) - V**2 * softening - V_rate * flow)
+        entry = _diagonal([mu * f.entry for mu, f in fields])
+        return (
+            M,
+            sp.csr_array(V * entry - 2.0 * V * flow),
+            sp.csr_array(interleaved(K) - V**2 * softening - V_rate * flow),
+        )
 
 
 def _diagonal(blocks: Sequence[sp.csr_array]) -> sp.csr_array:

@@ -29,8 +29,9 @@ __all__ = ["CONTRACTION", "FACTORS", "SeatPasses", "least_factor"]
 
 CONTRACTION = 0.9
 """Spectral radius below which two passes a step are trusted to be stable (energy of free vibration, tests)."""
-FACTORS = (1.0, 2.0, 4.0)
-"""Factors on the smeared seats, the least first: a larger one slows the passes down."""
+FACTORS = (1.0, 2.0, 4.0, 8.0, 16.0)
+"""Factors on the smeared seats, the least first: a larger one slows the passes down. Stiffened seats need the larger
+ones."""
 PHASES = 4  # places of the seats in a pitch at which the passes are tried
 ITERATIONS = 60  # of the power method: the modulus of the largest eigenvalue to a few per cent
 
@@ -48,6 +49,7 @@ class SeatPasses:
         gamma_dt: Newmark's gamma dt [s].
         V: Speed [m/s].
         factor: Of the smeared seats in A_s.
+        stiffest: Factor of the stiffest seats on the track.
     """
 
     operators: RailOperators
@@ -58,6 +60,7 @@ class SeatPasses:
     gamma_dt: float
     V: float
     factor: float = 1.0
+    stiffest: float = 1.0
 
     @property
     def impedance(self) -> tuple[float, float]:
@@ -67,6 +70,15 @@ class SeatPasses:
             self.beta_dt2 * f.vertical_stiffness + self.gamma_dt * f.vertical_damping,
             self.beta_dt2 * f.lateral_stiffness + self.gamma_dt * f.lateral_damping,
         )
+
+    @property
+    def lag(self) -> float:
+        """Part of the acceleration that a pass leaves where waves are long and seats sound.
+
+        Smeared and discrete seats are the same to them, so that nothing is left with the factor 1.
+        """
+        share: float = max(self.impedance) / (self.spacing * self.operators.rail.densities[0])
+        return (self.factor - 1.0) * share / (1.0 + self.factor * share)
 
     @cached_property
     def smeared(self) -> tuple[sp.csr_array, sp.csr_array]:
@@ -103,14 +115,15 @@ class SeatPasses:
         return found[0][:, 0, 0], found[1]
 
     def contraction(self, first_seat: float) -> float:
-        """Spectral radius of a pass, the larger of both blocks.
+        """Spectral radius of a pass over the stiffest seats, the larger of both blocks.
 
         Args:
             first_seat: Rear seat in the window [m].
         """
         s = np.arange(first_seat, self.operators.functions.length, self.spacing)
-        (z_v, z_l), f = self.impedance, self.fastening
-        flow_v, flow_l = (self.beta_dt2 * self.V * c for c in (f.vertical_damping, f.lateral_damping))
+        f = self.fastening
+        z_v, z_l = (self.stiffest * z for z in self.impedance)
+        flow_v, flow_l = (self.stiffest * self.beta_dt2 * self.V * c for c in (f.vertical_damping, f.lateral_damping))
         weights = ((np.array([z_v]), np.array([flow_v])), (np.array([z_l, z_v]), np.array([flow_l, flow_v])))
         rows, slopes = self._rows(s, 0), self._rows(s, 1)
         radius = 0.0

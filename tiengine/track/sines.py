@@ -56,7 +56,8 @@ class Sines:
         half, k = self.length / 2.0, self.wave_numbers
         values = sp.csr_array(sp.diags_array(np.full(self.modes, half)))
         slopes = sp.csr_array(sp.diags_array(half * k**2))
-        of_sines, of_cosines = (FieldProducts(values, sp.csr_array(G), slopes) for G in sine_products(self.modes))
+        none = sp.csr_array((self.modes, self.modes))
+        of_sines, of_cosines = (FieldProducts(values, sp.csr_array(G), slopes, none) for G in sine_products(self.modes))
         return Products(of_sines, of_cosines, sp.csr_array(sp.diags_array(half * k)))
 
     def shape(self, s: NDArray[np.float64], derivative: int = 0, over: float = 0.0) -> NDArray[np.float64]:

@@ -111,11 +111,20 @@ class Splines:
         phi, phi1, psi, psi1 = (
             p.coefficients @ self._powers(d) for p in (self.displacement, self.slope) for d in (0, 1)
         )
+        none = sp.csr_array((self.count, self.count))
         return Products(
-            FieldProducts(self._integral(phi, phi), self._integral(phi, phi1), self._integral(phi1, phi1)),
-            FieldProducts(self._integral(psi, psi), self._integral(psi, psi1), self._integral(psi1, psi1)),
+            FieldProducts(self._integral(phi, phi), self._integral(phi, phi1), self._integral(phi1, phi1), none),
+            FieldProducts(
+                self._integral(psi, psi), self._integral(psi, psi1), self._integral(psi1, psi1), self._entry()
+            ),
             self._integral(phi1, psi),
         )
+
+    def _entry(self) -> sp.csr_array:
+        """psi_i psi_j at the front, where the last function alone is not zero."""
+        last = [self.count - 1]
+        value = self.slope_shape(np.array([self.length]))[0, -1]
+        return sp.csr_array(sp.coo_array(([value**2], (last, last)), shape=(self.count, self.count)))
 
     def _powers(self, derivative: int) -> NDArray[np.float64]:
         """Derivatives of 1, x, x^2, x^3 at the Gauss points of every span, shape (spans, 4, points)."""

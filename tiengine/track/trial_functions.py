@@ -10,6 +10,12 @@ All five fields have the same number n of functions on 0 <= s <= l, of two kinds
 Slopes are free at the ends, only their derivative vanishes, as it does for a pinned beam. Hence the weak form of the
 convective stiffness has no boundary terms, int f f'' = -int f' f', for either kind, and what crosses the window's ends
 is left in int f f' alone, which is skew for phi and has the boundary values [psi psi] / 2 for psi.
+
+At the front this lets rail enter that already turns as the end does: a damper of -mu V/2 there. Waves of the slopes
+that stay near the end, because knots far from the wheels carry no such short ones, then grow by 5 to 50 1/s, however
+short the step. Splines therefore take up rail that is at rest: the momentum mu V psi psi dtheta/dt that it lacks makes
+the damper one of +0. Sines stay as in the source paper; theirs reach over the whole window and lose at the rear what
+they gain at the front.
 """
 
 from __future__ import annotations
@@ -32,11 +38,13 @@ class FieldProducts:
         values: int f_i f_j ds [m].
         flow: int f_i f_j' ds [-].
         slopes: int f_i' f_j' ds [1/m].
+        entry: f_i f_j at the front where rail that is at rest enters [-]; zero where it enters in the end's motion.
     """
 
     values: sp.csr_array
     flow: sp.csr_array
     slopes: sp.csr_array
+    entry: sp.csr_array
 
 
 @dataclass(frozen=True, eq=False)

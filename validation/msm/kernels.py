@@ -9,6 +9,7 @@ import taichi as ti
 
 from tiengine.kernels import contact as ct
 from tiengine.kernels import layout as at
+from tiengine.kernels import patches as pt
 from tiengine.kernels import step as engine
 from tiengine.kernels import suspension
 from tiengine.kernels import under_wheels as uw
@@ -304,6 +305,7 @@ def explicit_forces(
 
 @ti.kernel
 def implicit_and_contact(
+    patches: Template,
     tick: Ints1,
     dims: Ints1,
     constants: Reals1,
@@ -350,11 +352,12 @@ def implicit_and_contact(
                 rail_under_wheel(w, side, speed, shape_out, rails, rail_free_out)
         for w in range(dims[at.WHEELSETS]):
             channels = ct.channels_at(0, step, w, irregularity)
-            ct.solve_wheelset(
+            pt.solve_wheelset(
                 0, w, speed, wheelset_now(w, at.U, wheelset_dof, motion), wheelset_now(w, at.V, wheelset_dof, motion),
                 uw.stored_rail(0, w, 0, rail_free_out), uw.stored_rail(0, w, 1, rail_free_out), channels, dims,
                 constants, wheel, table, wheelset_compliance, rail_compliance_out, contact_out, force_out,
                 wheelset_force_out, rail_force_out, constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD],
+                patches,
             )  # fmt: skip
         keep_increments(wheelset_force_out, rail_force_out, wheelset_before_out, rail_before_out)
         add_wheels(constants, inverse, shape_out, rail_before_out, rails)
@@ -362,4 +365,4 @@ def implicit_and_contact(
         update_vehicle(constants, motion)
         if tick[at.LAST_PASS] == 1:
             for w in range(dims[at.WHEELSETS]):
-                ct.record_wheels(0, w, tick[at.STEP], contact_out, force_out, rail_force_out, wheel_record_out)
+                pt.record_wheels(0, w, tick[at.STEP], contact_out, force_out, rail_force_out, wheel_record_out, patches)

@@ -48,14 +48,15 @@ class FullState:
     def at_rest(cls, track: FullTrack) -> FullState:
         """All zero."""
         W = len(track.wheel)
-        contact = np.zeros((1, W, 2, N_CONTACT))
+        rows = at.CONTACT_ROWS[track.contact.patches]
+        contact = np.zeros((1, W, rows, N_CONTACT))
         contact[..., COS] = 1.0
         return cls(
             rails=np.zeros((at.MOTION_ROWS, 10, track.modes)),
             slabs=np.zeros((3, track.slabs, track.slab_modes + 2)),
             motion=np.zeros((at.MOTION_ROWS, track.train.n)),
             contact=contact,
-            force=np.zeros((1, W, 2, 4)),
+            force=np.zeros((1, W, rows, 4)),
             wheelset_force=np.zeros((1, W, 5)),
             rail_force=np.zeros((1, W, 2, 3)),
         )
@@ -68,7 +69,7 @@ class Buffers:
     Attributes:
         clock: Chainage of the first vehicle's centre, speed, its rate at the end of each step, shape (steps, N_CLOCK).
         irregularity: Track channels at the wheelsets, shape (1, steps, W, N_IRREGULARITY).
-        wheel: Wheel output of every step, shape (1, steps, W, 2, N_WHEEL).
+        wheel: Wheel output of every step, shape (1, steps, W, 2, N_WHEEL_RECORD).
         body: Recorded motion of the bodies, shape (1, rows, 3, 5 bodies).
         slabs: Displacement and velocity of the slabs, recorded with the bodies, shape (rows, 2, slabs, m + 2).
     """
@@ -86,7 +87,7 @@ class Buffers:
         return cls(
             clock=np.zeros((steps, at.N_CLOCK)),
             irregularity=np.zeros((1, steps, W, at.N_IRREGULARITY)),
-            wheel=np.zeros((1, steps, W, 2, at.N_WHEEL)),
+            wheel=np.zeros((1, steps, W, 2, at.N_WHEEL_RECORD[track.contact.patches])),
             body=np.zeros((1, body_rows, 3, 5 * bodies)),
             slabs=np.zeros((body_rows, 2, track.slabs, track.slab_modes + 2)),
         )
@@ -138,7 +139,7 @@ class FullStepper:
         )  # fmt: skip
         self._contact = Launch(
             kernels.implicit_and_contact,
-            (),
+            (track.contact.patches,),
             (
                 self._tick, track.dims, track.constants, buffers.clock, track.numbers, track.inverse, target, sign,
                 self._scattered, track.contact.values, buffers.irregularity, track.wheel, train.wheelset_x, dof,
