@@ -48,10 +48,11 @@ def test_what_cannot_roll_is_told():
         equilibrium(model, state_at_rest(model), 0.0, 350.0 * KMH, V_rate=1e9)
 
 
-def test_a_wheelset_on_stiffened_seats_finds_its_start():
+@pytest.mark.parametrize("friction", [0.3, 0.02])
+def test_a_wheelset_on_stiffened_seats_finds_its_start(friction):
     """The leading wheelset stands where stiffened fastenings begin: it sinks less and carries its load."""
     settings = ("track.failed_fastenings=[{seats = [50, 150], factor = 2.0}]", "numerics.window=44.0")
-    model = default_model(*settings)
+    model = default_model(*settings, f"track.friction={friction}")
     state = state_at_rest(model)
     equilibrium(model, state, 0.0, V350)
     np.testing.assert_allclose(state.normal_force.sum(axis=2), 2.0 * model.constants[at.STATIC_LOAD], rtol=0.05)

@@ -250,6 +250,8 @@ class _Problem:
         for friction in np.geomspace(max(EASY_FRICTION, wanted), wanted, steps):
             self._set_friction(float(friction))
             y, left = self._newton(y)
+            if not left < FORCE_TOLERANCE and reached == np.inf:
+                y, left = self._newton(self._guess(mean=False))
             if not left < FORCE_TOLERANCE:
                 break
             reached = float(friction)
