@@ -12,6 +12,7 @@ from tiengine.engine.equilibrium import equilibrium
 from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.state import DISPLACEMENT, State
 from tiengine.model.constant_data import Model
+from tiengine.model.curve_loads import CurveLoads, frame_offsets
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.conventions import GRAVITY
 
@@ -149,3 +150,21 @@ def test_the_start_in_a_curve_stays_in_balance(make: Any):
     for i in range(steps):
         stepper.step(i)
     assert np.abs(state.normal_force - before).max() < 0.05
+
+
+def test_a_coupling_between_cars_follows_the_chord_of_the_arc():
+    """A lateral link of body points at the couplers' common middle is not strained by an arc that both cars stand on.
+
+    By symmetry both middles lie off their frames by the same versine, so that only terms of the curvature's square are
+    left; taken against each car's own frame the link would be strained by 25 m times the heading between the cars.
+    """
+    train = default_model(line(), 'train.vehicles=["CRH380A_v2", "CRH380A_v2"]').ingredients.train
+    loads = default_model(line()).ingredients.given[0]
+    assert isinstance(loads, CurveLoads)
+    x, V = np.array([500.0]), np.array([[V350]])
+    offset, _ = frame_offsets(loads.alignment, train, x, V, 0.0)
+    first, second = (offset[0, i] for i in (0, len(train.body_x) // 2))
+    half, pitch = 12.5, 25.0
+    ends = first[0] - half * first[4], second[0] + half * second[4]
+    assert second[0] == pytest.approx(pitch**2 / (2.0 * R), rel=1e-6)  # versine of the arc
+    assert ends[0] - ends[1] == pytest.approx(0.0, abs=1e-9)

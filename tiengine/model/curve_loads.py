@@ -74,7 +74,18 @@ class CurveLoads:
         force -= (K @ offset.T).T + (C @ rate.T).T + V * (C_speed @ spinning.T).T
         by_rate = train.element_kind == 0
         elongation = np.where(by_rate, (rows @ rate.T).T, (rows @ offset.T).T)
+        self._between_cars(elongation, x, V)
         return GivenLoads(force[None], elongation[None], np.stack(turning, axis=2)[None])
+
+    def _between_cars(self, elongation: Reals, x: Reals, V: Reals) -> None:
+        """Elongations of elements between two vehicles, whose frames lie against that of the first of them."""
+        train, rows = self.train, self._matrices[3]
+        vehicle_x = np.repeat(train.body_vehicle_x, 5)
+        for e in np.flatnonzero(train.element_between_cars):
+            reference = float(vehicle_x[train.element_index[e, 0]])
+            motions = frame_offsets(self.alignment, train, x, V, reference)
+            motion = self._padded(motions[0 if train.element_kind[e] else 1])
+            elongation[:, e] = (rows[[e]] @ motion.T)[0]
 
     def _padded(self, bodies: Reals) -> Reals:
         """Coordinates of the train from those of the bodies, shape (steps, bodies, 5); internal states are zero."""
@@ -110,7 +121,9 @@ class CurveLoads:
         return V * kappa(at), V * phi(at, 1)
 
 
-def frame_offsets(alignment: Alignment, train: TrainModel, x: Reals, V: Reals) -> tuple[Reals, Reals]:
+def frame_offsets(
+    alignment: Alignment, train: TrainModel, x: Reals, V: Reals, reference: float | None = None
+) -> tuple[Reals, Reals]:
     """Motion of every body's frame against that of its vehicle's centre, and its rate.
 
     Args:
@@ -118,12 +131,15 @@ def frame_offsets(alignment: Alignment, train: TrainModel, x: Reals, V: Reals) -
         train: Places of the bodies.
         x: Chainage of the first vehicle's centre [m], shape (steps,).
         V: Speed [m/s], shape (steps, 1).
+        reference: Place of the frame that all others are compared with, from the first vehicle's centre [m]; each
+            body's own vehicle if None.
 
     Returns:
         y, z, roll, pitch, yaw [m, rad], shape (steps, bodies, 5); their rates.
     """
     kappa, phi, grade = alignment.lines
-    own, centre = x[:, None] + train.body_x, x[:, None] + train.body_vehicle_x
+    own = x[:, None] + train.body_x
+    centre = x[:, None] + (train.body_vehicle_x if reference is None else np.full(len(train.body_x), reference))
     d = own - centre
     u, v = np.zeros((*own.shape, 5)), np.zeros((*own.shape, 5))
     roll, turn = phi(own) - phi(centre), kappa.integral(own) - kappa.integral(centre)
