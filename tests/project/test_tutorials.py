@@ -29,7 +29,7 @@ SHORTER = {
         "[0] + 20.0": "[0] + 1.0",
         "in (8, 20)": "in (20,)",
     },
-    "gust": {"distance = 160.0": "distance = 8.0", "run_in = 20.0": "run_in = 1.0"},
+    "gust": {"distance = 160.0": "distance = 12.0", "run_in = 20.0": "run_in = 1.0"},
     "own_profiles": {"distance = 150.0": "distance = 5.0"},
     "hundred_trains": {
         "size = 100 ": "size = 4 ",
