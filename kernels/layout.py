@@ -78,6 +78,19 @@ MOTION_ROWS = 7
 # Channels of the irregularity at a wheelset: track values and their slopes along x.
 (Z_V, Y_A, CROSS_LEVEL, GAUGE, Z_V_SLOPE, Y_A_SLOPE, CROSS_LEVEL_SLOPE, GAUGE_SLOPE, N_IRREGULARITY) = range(9)
 
+# With shapes of single rails or wheels out of round: heights of either rail and their slopes; then as the host gives
+# them, how far the wheels' shapes have grown in, its derivative along x, the angle of rolling without slip on r0; or as
+# the contact feels them, radius deviations of either wheel and their slopes along the wheel's path.
+(RAIL_LEFT, RAIL_RIGHT, RAIL_LEFT_SLOPE, RAIL_RIGHT_SLOPE) = range(N_IRREGULARITY, N_IRREGULARITY + 4)
+(GROWN, GROWN_SLOPE, TURNED, N_SHAPED) = range(N_IRREGULARITY + 4, N_IRREGULARITY + 8)
+(WHEEL_LEFT, WHEEL_RIGHT, WHEEL_LEFT_SLOPE, WHEEL_RIGHT_SLOPE, N_FELT) = range(N_IRREGULARITY + 4, N_IRREGULARITY + 9)
+
+# Numbers of a wheelset: r0, b0, spin inertia, tables of its wheels out of round (-1 for none).
+(NOMINAL_RADIUS, HALF_SPACING, SPIN_INERTIA, ROUND_LEFT, ROUND_RIGHT, N_WHEEL_NUMBERS) = range(6)
+
+# Points of the table of a wheel out of round; the tables stand behind the numbers of ``constants``.
+ROUND_POINTS = 4096
+
 # Columns of the contact geometry table.
 (GAP, S_WHEEL, S_RAIL, RADIUS, TAN_GAMMA, HERTZ, C11, C22, C23, C33, N_TABLE) = range(11)
 

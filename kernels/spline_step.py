@@ -66,8 +66,16 @@ def sweep_slabs(
             slabs.clear_loads(slab, base, dofs)
 
 
-def step_kernel(lanes: int, K: int, blocks: int, patches: int) -> Any:
-    """Make the kernel for lanes of the rails, half width of the slabs' band, vectors a car's row, patches a wheel."""
+def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> Any:
+    """Make the kernel.
+
+    Args:
+        lanes: Lanes of the rails' vectors.
+        K: Half width of the slabs' band.
+        blocks: Vectors in a row of a car.
+        patches: Patches a wheel.
+        shaped: 1 if rails have shapes or wheels are out of round.
+    """
     lane_vectors = ti.types.ndarray(dtype=ti.types.vector(lanes, ti.f64), ndim=1)
     eights = ti.types.ndarray(dtype=ti.types.vector(8, ti.f64), ndim=1)
     trains_a_chunk = lanes // 2
@@ -223,7 +231,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int) -> Any:
                             b, c, 2 * (b - b0), step, V, tolerance, row, dims, constants, wheel_place,
                             wheelset_place, car_columns_start, car_columns, wheel, table, irregularity,
                             wheelset_compliance, coupling, contact, force, wheelset_force, rail_force, iterations,
-                            wheel_record, car, under, car_load, size, blocks, patches,
+                            wheel_record, car, under, car_load, size, blocks, patches, shaped,
                         )  # fmt: skip
                     wheels.add_wheel_columns(c, first, dims, wheel_place, wheel_rows, rail, under)
                 if stages & at.BACKWARD_STAGE:

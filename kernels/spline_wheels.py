@@ -9,6 +9,7 @@ import taichi as ti
 
 from tiengine.kernels import contact as ct
 from tiengine.kernels import layout
+from tiengine.kernels import out_of_round as oor
 from tiengine.kernels import patches as pt
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels.types import Array, Template
@@ -141,25 +142,36 @@ def add_wheelset_change(
 
 
 @ti.func
+def felt_channels(
+    b: int, step: int, w: int, pitch: float, irregularity: Array, wheel: Array, constants: Array, shaped: Template
+):
+    """Track channels under a wheelset in a step, with the shapes of rails and wheels if ``shaped`` = 1."""
+    if ti.static(shaped == 1):
+        return oor.shaped_channels_at(b, step, w, pitch, irregularity, wheel, constants)
+    else:
+        return ct.channels_at(b, step, w, irregularity)
+
+
+@ti.func
 def contact_of_train(
     b: int, c: int, lane: int, step: int, V: float, tolerance: float, record: int, dims: Array, constants: Array,
     place: Array, wheelset_place: Array, car_columns_start: Array, columns: Array, wheel: Array, table: Array,
     irregularity: Array, wheelset_compliance: Array, coupling: Array, contact: Array, force: Array,
     wheelset_force: Array, rail_force: Array, iterations_out: Array, wheel_record_out: Array, car: Array,
-    under: Array, load: Array, size: Array, blocks: Template, patches: Template,
+    under: Array, load: Array, size: Array, blocks: Template, patches: Template, shaped: Template,
 ):  # fmt: skip
     """Solve the contact of all wheelsets of a train, one after another, and leave the rails' loads in ``under``.
 
     A wheelset yaws against the rails with its own rate and that of the track frame. ``lane`` is the train's left rail;
-    ``record`` is the row of the wheels' record to fill, -1 for none; other arguments as in ``contact``,
-    ``vehicle_columns`` and this module.
+    ``record`` is the row of the wheels' record to fill, -1 for none; with ``shaped`` = 1 rails have shapes or wheels
+    are out of round (``out_of_round``); other arguments as in ``contact``, ``vehicle_columns`` and this module.
     """
     start = b * size[at.CARS] * at.CAR_ROWS * blocks * 8
     yaw_rate = (load_row(b, step, size, blocks) + size[at.CARS] * blocks) * 8 + size[at.ELEMENTS]
     for w in range(dims[layout.WHEELSETS]):
         p = (c * dims[layout.WHEELSETS] + w) * N_UNDER
-        channels = ct.channels_at(b, step, w, irregularity)
         x, dx = wheelset_without_change(b, w, start, constants, wheelset_place, car, blocks)
+        channels = felt_channels(b, step, w, x[3], irregularity, wheel, constants, shaped)
         dx[4] += number(load, yaw_rate + w)
         left = rail_without_change(b, w, 0, p, lane, dims, constants, place, coupling, rail_force, under)
         right = rail_without_change(b, w, 1, p, lane + 1, dims, constants, place, coupling, rail_force, under)

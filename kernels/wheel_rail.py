@@ -83,7 +83,7 @@ def contact_state(
         rail: w, v, theta_x of the rail under the wheel [m, m, rad].
         rail_slope: Their d/ds.
         rail_rate: Their rates at constant s.
-        irregularity: Track channels at the wheelset, see ``layout``.
+        irregularity: Track channels at the wheelset, N_IRREGULARITY of them or, with shapes, N_FELT, see ``layout``.
         rolls: 1 if a cross level turns the railheads.
         table: Contact geometry, shape (n_u, n_alpha, N_TABLE patches).
         constants: Numbers, see ``layout``.
@@ -97,6 +97,11 @@ def contact_state(
     z_slope = irregularity[at.Z_V_SLOPE] + sigma * b_i * irregularity[at.CROSS_LEVEL_SLOPE]
     y_irr = irregularity[at.Y_A] + sigma * 0.5 * irregularity[at.GAUGE]
     y_slope = irregularity[at.Y_A_SLOPE] + sigma * 0.5 * irregularity[at.GAUGE_SLOPE]
+    of_left, of_right = 0.5 - 0.5 * sigma, 0.5 + 0.5 * sigma
+    if ti.static(irregularity.get_shape()[0] > at.N_IRREGULARITY):
+        z_irr += of_left * irregularity[at.RAIL_LEFT] + of_right * irregularity[at.RAIL_RIGHT]
+        z_slope += of_left * irregularity[at.RAIL_LEFT_SLOPE] + of_right * irregularity[at.RAIL_RIGHT_SLOPE]
+        z_slope -= of_left * irregularity[at.WHEEL_LEFT_SLOPE] + of_right * irregularity[at.WHEEL_RIGHT_SLOPE]
 
     u = sigma * ((x[0] - r0 * x[2]) - (v + h_r * theta_x + y_irr))
     alpha = sigma * (x[2] - theta_x - turn)
@@ -112,6 +117,8 @@ def contact_state(
         - (w + z_irr + sigma * (b0 - y_r + u) * theta_x + sigma * (b0 - b_i + u) * turn)
         - g[at.GAP]
     )
+    if ti.static(irregularity.get_shape()[0] > at.N_IRREGULARITY):
+        p += of_left * irregularity[at.WHEEL_LEFT] + of_right * irregularity[at.WHEEL_RIGHT]
 
     # Lateral: the material velocity of the rail head. Vertical: a wheel that follows the rail's shape rolls on it.
     across = (

@@ -10,11 +10,11 @@ from scipy.stats import chi2
 
 from tiengine.irregularity.irregularity import (
     HALF_BASE,
-    PATCH_HALF_LENGTH,
     IrregularityParams,
     at_wheels,
     make_irregularity,
 )
+from tiengine.irregularity.patch_filter import PATCH_HALF_LENGTH
 from tiengine.irregularity.spectrum import (
     CHANNELS,
     band_variances,

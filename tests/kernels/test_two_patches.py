@@ -142,7 +142,7 @@ def disturbed(run: Run, shift: float) -> NDArray[np.float64]:
     return np.asarray(1e-5 * rng.standard_normal((1, 1, len(train.wheelset_dof), at.N_IRREGULARITY)))
 
 
-@pytest.mark.parametrize("make", [default_model, paper_model])
+@pytest.mark.parametrize("make", [default_model, pytest.param(paper_model, marks=pytest.mark.slow)])
 def test_newton_ends_at_the_law(make) -> None:
     """Wheelsets thrown to where both patches carry: few iterations, and the sum of recorded patches is the wheel's.
 

@@ -22,6 +22,14 @@ SHORTER = {
     "three_failed_fastenings": {
         "distance = 150.0": "distance = 20.0\nstart = 80.0\n[output]\nrun_in = 5.0\n",
     },
+    "polygonal_wheel": {
+        "distance = 60.0": "distance = 9.0",
+        "taper = 10.0 ": "taper = 1.0",
+        "run_in = 20.0": "run_in = 1.0",
+        "[0] + 20.0": "[0] + 1.0",
+        "in (8, 20)": "in (20,)",
+    },
+    "gust": {"distance = 160.0": "distance = 8.0", "run_in = 20.0": "run_in = 1.0"},
     "own_profiles": {"distance = 150.0": "distance = 5.0"},
     "hundred_trains": {
         "size = 100 ": "size = 4 ",

@@ -148,6 +148,15 @@ class Profile:
             return None
         return float(brentq(lambda s: float(z(s)) - depth, y[deep[-1]], y[deep[-1] + 1], xtol=1e-12))
 
+    @property
+    def flange_angle(self) -> float | None:
+        """Steepest angle of a wheel's flange between its tip and the tread [rad]; None without a flange of 10 mm."""
+        y = self.height.x[self.height.x <= 0.0]
+        if y.size < 2 or (z := self.height(y)).max() < 10e-3:
+            return None
+        flank = np.linspace(y[int(np.argmax(z))], 0.0, 2000)
+        return float(np.arctan(-self.height(flank, 1).min()))
+
     def _crown(self, cant: float) -> float:
         """The y where the head's tangent falls inward by ``cant`` [m]."""
         top = float(self.y[np.argmin(self.z)])

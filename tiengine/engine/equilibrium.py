@@ -203,7 +203,7 @@ class _Problem:
         out = np.broadcast_to(self.load, x.shape) - x @ self.train.K.T
         out = out - self.spread(rates) @ (self.train.C + self.V * self.train.C_speed).T
         out[:, self.train.wheelset_dof] += found.wheelset
-        if self.model.ingredients.given:
+        if self.model.ingredients.given or self.train.element_between_cars.any():
             out += self._beyond_linear(x, rates)
         return np.hstack([out, (found.rail - force).reshape(len(y), -1)])
 

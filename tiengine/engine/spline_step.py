@@ -43,7 +43,7 @@ class Contact:
     """Arrays that the contact solve reads and leaves, shapes as ``engine.sine_state`` and ``model.model`` have them.
 
     Attributes:
-        wheel: r0, b0, spin inertia, shape (W, 3).
+        wheel: Numbers of each wheelset, shape (W, N_WHEEL_NUMBERS).
         table: Contact geometry, shape (n_u, n_alpha, N_TABLE patches).
         contact: Contact states, shape (B, W, CONTACT_ROWS, N_CONTACT).
         force: N, Fx, Fy, Mz on the wheels, shape (B, W, CONTACT_ROWS, 4).
@@ -133,7 +133,7 @@ class SplineStep:
             suspension: Nonlinear elements.
             contact: Arrays of the contact.
             clock: Window at the end of each step, shape (steps, N_CLOCK).
-            irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY).
+            irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
             wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL_RECORD).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
             slab_record: Displacement, velocity, acceleration of every slab coordinate where the bodies are recorded,
@@ -169,9 +169,10 @@ class SplineStep:
         )  # fmt: skip
         vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, slab_record,
                    state.car, cars.columns, car_load)  # fmt: skip
+        shaped = int(irregularity.shape[-1] > layout.N_IRREGULARITY)
         self.launch = VectorLaunch(
             step_kernel,
-            (state.lanes, slabs.half_width, cars.blocks, contact.patches),
+            (state.lanes, slabs.half_width, cars.blocks, contact.patches, shaped),
             arrays,
             frozenset(i for i, array in enumerate(arrays) if any(array is vector for vector in vectors)),
         )

@@ -161,7 +161,7 @@ class Stepper(ABC):
             X: Chainage of the window's rear end at the end of each step [m], shape (steps,).
             V: Speed [m/s].
             V_rate: Its rate [m/s^2].
-            irregularity: Track channels, shape (B, steps, W, N_IRREGULARITY).
+            irregularity: Track channels, shape (B, steps, W, channels).
             given: Loads of the train beyond gravity; None where it has none.
         """
         clock = window_clock(self.ingredients.slab, X, V, V_rate, self.ingredients.seat_reach)

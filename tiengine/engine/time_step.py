@@ -11,8 +11,11 @@ from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.stability import of_trains, step_growth, with_stiffest_seats
 from tiengine.engine.vector_mode import lanes_for
 from tiengine.irregularity.irregularity import IrregularityParams
-from tiengine.irregularity.track_checks import check_step, shortest_wavelength
+from tiengine.irregularity.rail_shapes import RailShapes
+from tiengine.irregularity.track_checks import check_step, check_wave, shortest_wavelength
+from tiengine.irregularity.wheel_shapes import WheelTables, wheel_tables
 from tiengine.model.from_scenario import ingredients
+from tiengine.model.given_sources import given_sources
 from tiengine.model.model import Ingredients, Model, build_model
 from tiengine.model.newmark import Newmark
 from tiengine.model.spline_model import DivergingPassesError, SplineModel
@@ -53,16 +56,23 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     V = scenario.train.speed.at(scenario.rear + scenario.centre_in_window)[0]
     fastest = scenario.train.speed.fastest
     shortest = shortest_wavelength(scenario.irregularity)
+    round_tables = _wheel_tables(scenario)
+    waves = _waves_of_shapes(scenario, round_tables)
     jit, reason = 0.0, ""
     for dt in AUTO_STEPS if wanted == "auto" else (float(wanted),):
         try:
             check_wavelength(scenario, dt)
             check_step(scenario.irregularity, shortest, fastest, dt)
+            for name, wavelength in waves:
+                check_wave(name, wavelength, fastest, dt)
         except InputError:
             if wanted == "auto" and dt != AUTO_STEPS[-1]:
                 continue
             raise
-        parts, lanes = replace(_ingredients(_Key.of(scenario)), newmark=Newmark(dt)), lanes_for(trains)
+        kept = _ingredients(_Key.of(scenario))
+        given = given_sources(scenario, kept.train)  # files are read anew
+        parts = replace(kept, newmark=Newmark(dt), out_of_round=round_tables, given=given)
+        lanes = lanes_for(trains)
         try:
             model = build_model(parts, fastest)
         except DivergingPassesError as error:
@@ -79,6 +89,26 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
                 return of_trains(model, trains), jit
             return build_model(replace(parts, trains=trains), V), jit
     raise InputError(f"numerics.time_step = {wanted}: unstable; {reason}; {_advice(scenario, parts, lanes)}")
+
+
+def _wheel_tables(scenario: Scenario) -> WheelTables | None:
+    """Tables of wheels out of round, their files read anew; None where all are round."""
+    shapes = scenario.train.wheel_shapes
+    return wheel_tables(shapes, scenario.parts.wheel_radii) if shapes else None
+
+
+def _waves_of_shapes(scenario: Scenario, tables: WheelTables | None) -> list[tuple[str, float]]:
+    """Name and length [m] of the shortest wave of every shape of rails and wheels."""
+    shapes = scenario.track.rail_shapes
+    found = [
+        (f"track.rail_shapes[{i}]: shortest wave of the {shape.kind}", wave)
+        for i, (shape, wave) in enumerate(zip(shapes, RailShapes(shapes).waves, strict=True))
+    ]
+    if tables is not None:
+        names = [f"{tables.name(table)}, of order {order}," for table, (_, order) in enumerate(tables.waves)]
+        waves = [wave for wave, _ in tables.waves]
+        found += [(f"train.wheel_shapes: shortest wave of {name}", w) for name, w in zip(names, waves, strict=True)]
+    return found
 
 
 def _instability(scenario: Scenario, model: Model, lanes: int) -> str:

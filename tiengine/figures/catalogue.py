@@ -53,6 +53,24 @@ KINDS = (
         " within the dashed limits; where the grey band reaches zero, a wheel has lost contact with the rail.",
     ),
     Kind(
+        "alignment",
+        "Alignment",
+        "Curvature, cant and gradient of the line that was run; the cant deficiency is what the wheels have to carry"
+        " sideways, 153 mm for each m/s² of unbalanced acceleration.",
+    ),
+    Kind(
+        "curving",
+        "Forces in curves",
+        "In an arc the forces settle to quasi-static values, the outer wheels carry more; jumps at the ends of"
+        " transitions would point to a fault of the line.",
+    ),
+    Kind(
+        "steering",
+        "Steering",
+        "A wheelset that stands radially has no yaw; a leading wheelset that yaws by several mrad in a sharp curve runs"
+        " against the outer rail with its flange.",
+    ),
+    Kind(
         "envelopes",
         "Fastenings and slabs",
         "Neighbouring fastenings take over the load of a failed one: the upper panel shows their load relative to a"
@@ -76,6 +94,12 @@ KINDS = (
         "Contact positions",
         "Contact should stay on the tread; a second peak near the flange root (negative positions) is flange contact."
         " Filled: the second patch, where wheels may have two.",
+    ),
+    Kind(
+        "revolution",
+        "Wheels out of round",
+        "Peaks of the force that follow the tread, revolution after revolution, come from the wheel; the black line is"
+        " the tread, much enlarged. Where the grey band reaches the middle, the wheel has lost contact.",
     ),
     Kind(
         "ride",

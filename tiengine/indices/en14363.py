@@ -1,5 +1,7 @@
 """EN 14363, running behaviour of a vehicle on straight track (zone 1), normal method.
 
+Curves of the line are left out here; :mod:`tiengine.indices.curves` has their zones.
+
 Quantities: the quotient Y/Q and the sum of the lateral forces Y of a wheelset, low pass of 20 Hz, means over 2 m every
 0.5 m; the wheel force Q, low pass of 20 Hz; accelerations of floor points over the bogies, 0.4 to 10 Hz. The value of a
 series is the greater in magnitude of its percentiles 0.15 and 99.85, for Q the upper one.
@@ -21,7 +23,7 @@ import numpy as np
 
 from tiengine.indices.filters import band_pass, band_pass_settling, sliding_mean
 from tiengine.indices.index import Index, no_limit, worst, worst_of
-from tiengine.indices.ride import Direction, FloorPoint, Ride
+from tiengine.indices.ride import MEAN, Direction, FloorPoint, Ride
 from tiengine.parameters.arrays import Reals
 from tiengine.vehicle.connector import VehicleClass
 
@@ -126,7 +128,9 @@ def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
 
 
 def _wheelset_indices(ride: Ride, vehicle: int, wheelset: int) -> Iterator[Index]:
-    forces, speed, vehicle_class = ride.forces(wheelset), ride.speed, ride.vehicle_classes[vehicle]
+    forces, speed, vehicle_class = ride.straight_forces(wheelset), ride.speed, ride.vehicle_classes[vehicle]
+    if len(forces.position) < 2 or forces.position[-1] - forces.position[0] < MEAN:
+        return  # no straight track
     reason = _shortfall(ride, vehicle, forces.position)
 
     def index(name: str, place: str, value: float, unit: str, limit: float | None, clause: str) -> Index:

@@ -43,6 +43,7 @@ __all__ = [
     "unloading",
     "unloading_limit",
     "wheel_indices",
+    "wheelset_values",
 ]
 
 STANDARD = "GB/T 5599-2019"
@@ -128,16 +129,22 @@ def wheel_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
     found: dict[str, list[Index]] = {}
     vehicle_class = ride.vehicle_classes[vehicle]
     for w in ride.wheelsets(vehicle):
-        for name, side, value, unit, limit in _wheelset_values(ride.forces(w), ride.speed, vehicle_class):
+        for name, side, value, unit, limit in wheelset_values(ride.forces(w), ride.speed, vehicle_class):
             index = _index(ride, vehicle, name, f"wheelset {w + 1}{side}", value, unit, limit, "cl. 9, 10, app. D")
             found.setdefault(name, []).append(index)
     yield from map(worst, found.values())
 
 
-def _wheelset_values(
+def wheelset_values(
     forces: Forces, speed: float, vehicle_class: VehicleClass | None
 ) -> Iterator[tuple[str, str, float, str, float | None]]:
-    """Yield name, side, value, unit and limit of each index."""
+    """Yield name, side, value, unit and limit of each index of a wheelset.
+
+    Args:
+        forces: Its forces.
+        speed: Speed of the train [m/s].
+        vehicle_class: Class of its vehicle.
+    """
     for i, side in enumerate((" left", " right")):
         _, quotient = sliding_mean(forces.position, forces.quotient[:, i])
         limit = DERAILMENT_LIMITS.get(vehicle_class)

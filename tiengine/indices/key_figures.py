@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tiengine.indices.extremes import Extremes, read_extremes
+from tiengine.indices.revolutions import revolutions, shaped_wheels
 from tiengine.indices.train_record import AbsentError, Train
 from tiengine.indices.wheel_extremes import ForceExtreme, WheelExtremes, wheel_extremes
 from tiengine.parameters.arrays import Reals
@@ -60,7 +61,7 @@ def key_figures(train: Train) -> list[KeyFigure]:
         train: The train.
     """
     found: list[KeyFigure] = []
-    for part in (_wheels, _seats, _slabs):
+    for part in (_wheels, _revolutions, _seats, _slabs):
         try:
             found += part(train)
         except AbsentError:
@@ -85,6 +86,17 @@ def summarise(trains: Sequence[tuple[int, Sequence[KeyFigure]]]) -> list[Summary
         low, median, high = np.percentile([figure.value for _, figure in entries], (5.0, 50.0, 95.0))
         summaries.append(Summary(worst, train, float(median), (float(low), float(high))))
     return summaries
+
+
+def _revolutions(train: Train) -> Iterator[KeyFigure]:
+    """Largest force of a revolution, the mean of all revolutions, of the worst wheel out of round."""
+    tables, wheels = shaped_wheels(train)
+    found = [revolutions(train, w, side, tables) for w, side in wheels]
+    means = [float(each.of_revolution.mean()) if each.of_revolution.size else float("nan") for each in found]
+    if not np.isfinite(means).any():
+        raise AbsentError("no wheel out of round makes a whole revolution after the run-in")
+    worst = int(np.nanargmax(means))
+    yield KeyFigure("peak force of a revolution, mean", means[worst] / 1e3, "kN", found[worst].name)
 
 
 def _wheels(train: Train) -> Iterator[KeyFigure]:

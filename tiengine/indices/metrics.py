@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from tiengine.indices import comfort, en14363, gb5599
+from tiengine.indices import comfort, curves, en14363, gb5599
 from tiengine.indices.index import Index, worst
 from tiengine.indices.recorded_ride import RecordedRide
 from tiengine.indices.ride import Ride
@@ -24,6 +24,7 @@ __all__ = ["Metrics", "Spread", "TrainMetrics", "evaluate", "train_metrics"]
 FORMAT, FORMAT_VERSION = "tiengine-metrics", 1
 METHODS = (
     en14363.wheel_indices,
+    curves.wheel_indices,
     en14363.body_indices,
     gb5599.wheel_indices,
     gb5599.body_indices,

@@ -67,6 +67,8 @@ class RecordedRide(Ride):
         self._wheel = self._group(result[f"trains/{train:03d}"], "wheel", ("lateral_force", "vertical_force"))
         self._body = self._group(result[f"trains/{train:03d}"], "body", ("acceleration",))
         self.speed = scenario.train.speed.fastest
+        self.line, self.friction = scenario.track.line, scenario.track.friction
+        self.flange_angle = scenario.parts.wheel.flange_angle
         self.wheel_times = self._times(self._wheel, "wheel", scenario.output.run_in)
         self.body_times = self._times(self._body, "body", scenario.output.run_in)
         self.check_distance()
@@ -86,6 +88,29 @@ class RecordedRide(Ride):
     def vehicle_of(self, wheelset: int) -> int:
         """Return the vehicle of a wheelset; both are numbered from 0."""
         return int(self._model.wheelset_vehicle[wheelset])
+
+    def offset(self, wheelset: int) -> float:
+        """Return the place of a wheelset ahead of the chainage of the signals, the first vehicle's centre [m]."""
+        return float(self._model.wheelset_x[wheelset])
+
+    def wear_number(self, wheelset: int) -> tuple[Reals, Reals] | None:
+        """Return chainages [m] after the run-in and the wear number of both wheels [N], None without its channels."""
+        pairs = [
+            (f"{name}_creepage", force)
+            for name, force in (
+                ("longitudinal", "longitudinal_creep_force"),
+                ("lateral", "lateral_creep_force"),
+                ("spin", "spin_moment"),
+            )
+        ]  # fmt: skip
+        if any(name not in self._wheel for pair in pairs for name in pair):
+            return None
+        number = sum(
+            np.abs(self._wheel[slip][:, wheelset].astype(np.float64) * self._wheel[force][:, wheelset])
+            for slip, force in pairs
+        )
+        keep = self._from_same_chainage(self.wheel_times, self.vehicle_of(wheelset)).used()
+        return self.wheel_times.position[keep], np.asarray(number)[keep]
 
     def lag(self, vehicle: int) -> float:
         """Return the distance of a vehicle's leading wheelset behind that of the first one [m]."""

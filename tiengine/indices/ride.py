@@ -17,8 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.indices.filters import low_pass, low_pass_settling
+from tiengine.indices.zones import ZONES, stretches
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
+from tiengine.track.alignment import Alignment
 from tiengine.vehicle.connector import VehicleClass
 
 __all__ = ["FORCE_CUT_OFF", "LEAST_DISTANCE", "Direction", "FloorPoint", "Forces", "Ride", "Times", "even_interval"]
@@ -104,12 +106,18 @@ class Ride(ABC):
         speed: Largest speed [m/s].
         wheel_times: Sampling of the wheel forces; None without them.
         body_times: Sampling of the accelerations; None without them.
+        line: Curvature and cant of the track; None where it is straight and level.
+        flange_angle: Steepest angle of the wheels' flanges [rad]; None where it is not known.
+        friction: Coefficient of friction between wheel and rail.
     """
 
     where: str
     speed: float
     wheel_times: Times | None
     body_times: Times | None
+    line: Alignment | None = None
+    flange_angle: float | None = None
+    friction: float = 0.3
 
     @property
     @abstractmethod
@@ -131,6 +139,27 @@ class Ride(ABC):
     def vehicle_of(self, wheelset: int) -> int:
         """Return the vehicle of a wheelset; both are numbered from 0."""
         return 0
+
+    def offset(self, wheelset: int) -> float:
+        """Return the place of a wheelset ahead of the chainage of the signals [m]."""
+        return 0.0
+
+    def wear_number(self, wheelset: int) -> tuple[Reals, Reals] | None:
+        """Return chainages of the train [m] and the wear number of both wheels [N], shape (n, 2); None if unknown."""
+        return None
+
+    def straight_forces(self, wheelset: int) -> Forces:
+        """Filter the forces of one wheelset and keep the longest stretch of straight track, all without curves."""
+        forces = self.forces(wheelset)
+        if self.line is None or not len(forces.position):
+            return forces
+        own = forces.position + self.offset(wheelset)
+        straight = [s for s in stretches(self.line, float(own[0]), float(own[-1])) if s.zone is ZONES[0]]
+        if not straight:
+            return Forces(own[:0], forces.Y[:0], forces.Q[:0], forces.static)
+        longest = max(straight, key=lambda stretch: stretch.end - stretch.begin)
+        kept = (own >= longest.begin) & (own <= longest.end)
+        return Forces(forces.position[kept], forces.Y[kept], forces.Q[kept], forces.static)
 
     def lag(self, vehicle: int) -> float:
         """Return the distance of a vehicle behind the first one [m]."""

@@ -15,6 +15,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from tiengine.irregularity.measured_files import MeasuredSeries, read_series
 from tiengine.irregularity.measured_track import MeasuredTrack, smooth_step
+from tiengine.irregularity.patch_filter import PATCH_HALF_LENGTH
 from tiengine.irregularity.random_track import BlockSpline, noise_spline
 from tiengine.irregularity.spectrum import (
     CHANNELS,
@@ -34,7 +35,6 @@ from tiengine.parameters.quantity import Params, Q
 
 __all__ = [
     "HALF_BASE",
-    "PATCH_HALF_LENGTH",
     "Irregularity",
     "IrregularityParams",
     "at_wheels",
@@ -43,9 +43,6 @@ __all__ = [
 
 HALF_BASE = 0.75
 """b_i [m]: half the distance over which the cross level is an angle."""
-
-PATCH_HALF_LENGTH = 6e-3
-"""Half length of the contact patch along the rail [m] in the filter of short waves (6 to 7 mm at 70 kN)."""
 
 _ROUGHNESS_BLOCK = 64.0  # m, half a block at least: a train then lies in a few blocks, not hundreds
 _RAIL_SCALES = np.array([1.0, 1.0, HALF_BASE, 0.5])  # of z_v, y_a, theta, gauge to the displacement of a rail
@@ -249,13 +246,21 @@ class Irregularity:
             v, s = part.evaluate(flat)
             value += v
             slope += s
-        t = (flat - self.taper_start) / self.taper
-        if flat.size and t.min() < 1.0:
-            T, T_slope = smooth_step(t)
+        if flat.size and ((flat - self.taper_start) / self.taper).min() < 1.0:
+            T, T_slope = self.grown(flat)
             slope *= T[:, None]
-            slope += value * (T_slope / self.taper)[:, None]
+            slope += value * T_slope[:, None]
             value *= T[:, None]
         return out.reshape(*chainage.shape, -1)
+
+    def grown(self, x: Reals) -> tuple[Reals, Reals]:
+        """Share of its full amplitude to which the irregularity has grown, and the share's slope [1/m].
+
+        Args:
+            x: Chainages [m], any shape.
+        """
+        T, T_slope = smooth_step((x - self.taper_start) / self.taper)
+        return T, T_slope / self.taper
 
 
 def make_irregularity(

@@ -88,6 +88,7 @@ def read_series(
     columns: FileColumns | None = None,
     encoding: Encoding = "auto",
     bridge: float = 0.0,
+    key: str = "irregularity.file",
 ) -> MeasuredSeries:
     """Read a measured series.
 
@@ -101,11 +102,12 @@ def read_series(
         columns: Columns that are read, if not all by their heads.
         encoding: Encoding of the file.
         bridge: Longest stretch without values that is filled [m].
+        key: Key of the scenario that names the file.
 
     Raises:
         InputError: The file breaks a rule; the message names file, line and rule, encoding and separator.
     """
-    text = read_track_text(path, encoding)
+    text = read_track_text(path, encoding, key)
     found, width, first = find_columns(text, columns or FileColumns(), unit)
     rows = text.lines[first:]
     if len(rows) < 4:

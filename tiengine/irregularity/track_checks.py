@@ -72,7 +72,8 @@ def check_wave(name: str, wavelength: float, speed: float, dt: float) -> None:
     if wavelength < least:
         raise InputError(
             f"{name} = {wavelength:g} m: must be at least {STEPS_PER_WAVE:g} V dt = {least:.4g} m"
-            f" at a time step of {dt:g} s; choose a smaller step or a longer wave"
+            f" at a time step of {dt:g} s; set numerics.time_step <= {wavelength / (STEPS_PER_WAVE * speed):.2g}, or"
+            " choose a longer wave"
         )
 
 

@@ -98,17 +98,18 @@ class TrackText:
         return value
 
 
-def read_track_text(path: str | Path, encoding: Encoding = "auto") -> TrackText:
+def read_track_text(path: str | Path, encoding: Encoding = "auto", key: str = "irregularity.file") -> TrackText:
     """Read the text of a measured track.
 
     Args:
         path: The file.
         encoding: Its encoding; ``"auto"`` detects it.
+        key: Key of the scenario that names it.
 
     Raises:
         InputError: The file cannot be read, is too large, is not text in this encoding, or holds too long a line.
     """
-    where = f"irregularity.file = {str(path)!r}"
+    where = f"{key} = {str(path)!r}"
     data = read_bytes(path, where, LARGEST_TRACK)
     text, name = _decoded(data, encoding, where)
     lines = []

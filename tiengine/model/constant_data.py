@@ -37,14 +37,14 @@ class Model(ABC):
     Attributes:
         ingredients: Track, train and numerics.
         dims: Sizes and offsets (``layout``).
-        constants: Numbers (``layout``).
+        constants: Numbers (``layout``), then the tables of wheels out of round.
         bed_index, bed_shape, bed_weight: Quadrature of the bed.
         bed_points: Slab coordinates to w at all quadrature points, shape (dofs, points).
         bed_factor, bed_rest: Factors and pressures at rest by design.
         bed_lateral_K, bed_lateral_C: Lateral bed by design, shape (designs, 2, 2).
         bed_numbers: k_m, c_m, explicit, no tension.
         vehicle_load: Gravity, and force per unit rate of speed, shape (2, n).
-        wheel: r0, b0, spin inertia, shape (W, 3).
+        wheel: Numbers of each wheelset (``layout``), shape (W, N_WHEEL_NUMBERS).
     """
 
     ingredients: Ingredients
@@ -88,7 +88,7 @@ def shared_arrays(ingredients: Ingredients) -> dict[str, Any]:
             [mortar.stiffness, mortar.damping, float(ingredients.explicit_mortar), float(mortar.no_tension)]
         ),
         "vehicle_load": np.stack([train.gravity, train.acceleration_force]),
-        "wheel": np.stack([train.wheel_radius, train.half_spacing, train.wheelset_spin_inertia], axis=1),
+        "wheel": _wheels(ingredients),
     }
 
 
@@ -104,6 +104,17 @@ def slab_operators(ingredients: Ingredients) -> list[SlabOperators]:
         A = ingredients.newmark.operator(sp.csr_array(slab.M), sp.csr_array(C + own_C), sp.csr_array(K + own_K))
         found.append((A.toarray(), K, C))
     return found
+
+
+def _wheels(ingredients: Ingredients) -> Reals:
+    """Numbers of each wheelset, shape (W, N_WHEEL_NUMBERS)."""
+    train, tables = ingredients.train, ingredients.out_of_round
+    wheel = np.full((len(train.wheel_radius), at.N_WHEEL_NUMBERS), -1.0)
+    wheel[:, at.NOMINAL_RADIUS], wheel[:, at.HALF_SPACING] = train.wheel_radius, train.half_spacing
+    wheel[:, at.SPIN_INERTIA] = train.wheelset_spin_inertia
+    if tables is not None:
+        wheel[:, at.ROUND_LEFT : at.ROUND_RIGHT + 1] = tables.number
+    return wheel
 
 
 def _dims(ingredients: Ingredients, first: SlabMatrices) -> NDArray[np.int32]:
@@ -126,7 +137,10 @@ def _dims(ingredients: Ingredients, first: SlabMatrices) -> NDArray[np.int32]:
 
 def _constants(ingredients: Ingredients) -> Reals:
     """Numbers, see ``layout``; those of the trial functions are added by the derived class."""
-    c = np.zeros(at.N_CONSTANTS)
+    tables = ingredients.out_of_round
+    c = np.zeros(at.N_CONSTANTS + (0 if tables is None else tables.values.size))
+    if tables is not None:
+        c[at.N_CONSTANTS :] = tables.values.ravel()
     newmark, fastening, rail, table = ingredients.newmark, ingredients.fastening, ingredients.rail, ingredients.contact
     dt = newmark.dt
     c[at.DT], c[at.BETA_DT2], c[at.GAMMA_DT] = dt, newmark.beta_dt2, newmark.gamma_dt

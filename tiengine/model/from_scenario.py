@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table_cache import contact_table
-from tiengine.model.curve_loads import CurveLoads
+from tiengine.irregularity.wheel_shapes import wheel_tables
+from tiengine.model.given_sources import given_sources
 from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.model.newmark import Newmark
 from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.defects import fastening_factors
 from tiengine.track.slab_matrices import slab_designs
-from tiengine.vehicle.given_loads import LoadSource
-from tiengine.vehicle.train import TrainModel, assemble
+from tiengine.vehicle.train import assemble
 
 __all__ = ["ingredients"]
 
@@ -33,9 +33,15 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         InputError: Parts that do not fit together.
     """
     parts, numerics = scenario.parts, scenario.numerics
-    asked = scenario.train
-    train = assemble(parts.vehicles, parts.centres, series_springs=asked.series_springs or None, effort=asked.effort)
-    if scenario.track.line is not None:
+    asked, shapes = scenario.train, scenario.train.wheel_shapes
+    train = assemble(
+        parts.vehicles,
+        parts.centres,
+        series_springs=asked.series_springs or None,
+        effort=asked.effort,
+        couplings=parts.couplings,
+    )
+    if scenario.track.line is not None or scenario.wind.speed is not None or asked.forces:
         train = replace(train, K=train.K + train.K_leaning)
     return Ingredients(
         rail=parts.rail,
@@ -57,14 +63,10 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         local_compliance=numerics.truncation == "local",
         absorbing_zone=numerics.absorbing_zone,
         explicit_mortar=numerics.mortar == "explicit",
-        given=_given(scenario, train),
+        given=given_sources(scenario, train),
+        shaped=bool(shapes or scenario.track.rail_shapes),
+        out_of_round=wheel_tables(shapes, parts.wheel_radii) if shapes else None,
     )
-
-
-def _given(scenario: Scenario, train: TrainModel) -> tuple[LoadSource, ...]:
-    """Given loads of the train: those of a line that is not straight and level."""
-    line = scenario.track.line
-    return () if line is None else (CurveLoads(line, train),)
 
 
 def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64]]:

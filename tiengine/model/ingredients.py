@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
+from tiengine.irregularity.wheel_shapes import WheelTables
+from tiengine.kernels import layout as at
 from tiengine.model.newmark import Newmark
 from tiengine.parameters.arrays import Reals
 from tiengine.track.fastening import Fastening, seat_count
@@ -66,6 +68,8 @@ class Ingredients:
         grading: Knots of the splines; None for sines.
         local_compliance: Add the static compliance that the trial functions lack under the wheels.
         absorbing_zone: Length of the zones at the window's ends with additional springs to the ground [m]; 0 for none.
+        shaped: Whether rails have shapes or wheels are out of round.
+        out_of_round: Tables of wheels out of round; None where all are round.
         trains: Trains advanced together.
         given: What makes given loads of the train, beyond gravity.
     """
@@ -89,6 +93,8 @@ class Ingredients:
     explicit_mortar: bool = False
     local_compliance: bool = False
     absorbing_zone: float = 0.0
+    shaped: bool = False
+    out_of_round: WheelTables | None = None
     trains: int = 1
     given: tuple[LoadSource, ...] = ()
 
@@ -100,6 +106,11 @@ class Ingredients:
     def given_loads(self, time: Reals, x: Reals, V: Reals, V_rate: Reals) -> GivenLoads | None:
         """Sum of the given loads, None if there are none; arguments as in :class:`LoadSource`."""
         return sum_of_loads(self.given, self.train, time, x, V, V_rate) if self.given else None
+
+    @property
+    def channels(self) -> int:
+        """Track channels at a wheelset that the step takes."""
+        return at.N_SHAPED if self.shaped else at.N_IRREGULARITY
 
     @property
     def slots(self) -> int:

@@ -20,7 +20,17 @@ from tiengine.parameters.input_files import (
 
 __all__ = ["KINDS", "LONGEST_PATH", "find_preset", "preset_names", "preset_source"]
 
-KINDS = ("vehicles", "rails", "slabs", "fastenings", "profiles", "irregularity", "scenarios")
+KINDS = (
+    "vehicles",
+    "couplings",
+    "aerodynamics",
+    "rails",
+    "slabs",
+    "fastenings",
+    "profiles",
+    "irregularity",
+    "scenarios",
+)
 """Folders of the library."""
 
 LONGEST_PATH = 1000  # characters of a name or path in a scenario

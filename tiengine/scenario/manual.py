@@ -28,7 +28,9 @@ from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail
 from tiengine.track.slab import Slab
 from tiengine.vehicle.coach import Coach
+from tiengine.vehicle.coupling import Coupling
 from tiengine.vehicle.vehicle import Vehicle
+from tiengine.vehicle.wind import Aerodynamics
 
 __all__ = ["Table", "channel_tables", "page", "tables", "with_channels"]
 
@@ -95,6 +97,8 @@ def tables() -> tuple[list[Table], list[Table]]:
         ("slab, `[mortar]`", Mortar),
         ("fastening", Fastening),
         ("profile", ProfilePoints),
+        ("coupling", Coupling),
+        ("aerodynamics of a car", Aerodynamics),
         ("vehicle, as a coach on bogies", Coach),
         ("vehicle, as bodies and connectors", Vehicle),
     ):

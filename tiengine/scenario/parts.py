@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tiengine.contact.point_list import Kind
 from tiengine.contact.profile import Profile
 from tiengine.parameters.errors import InputError, nearest
-from tiengine.parameters.input_files import load_toml
+from tiengine.parameters.input_files import load_toml, to_tuples
 from tiengine.parameters.presets import KINDS, find_preset
 from tiengine.parameters.quantity import build
 from tiengine.scenario.part import Presets
@@ -27,10 +27,12 @@ from tiengine.track.fastening import Fastening
 from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail
 from tiengine.track.slab import Slab
+from tiengine.vehicle.coupling import Coupling
 from tiengine.vehicle.vehicle import Vehicle, vehicle_from_table
+from tiengine.vehicle.wind import Aerodynamics
 
 if TYPE_CHECKING:
-    from tiengine.scenario.tables import Track, Train
+    from tiengine.scenario.tables import BlowingWind, Track, Train
 
 __all__ = ["Parts", "build_parts", "collect_presets", "used_presets"]
 
@@ -48,6 +50,9 @@ class Parts:
         slab: Slab.
         mortar: Mortar bed of the slab.
         fastening: Fastening.
+        couplings: Couplings, each with the number of the vehicle ahead, from 0.
+        aerodynamics: Coefficients of the car bodies; None without wind.
+        forced: Number in the train of the body of every given force.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -58,6 +63,9 @@ class Parts:
     slab: Slab
     mortar: Mortar
     fastening: Fastening
+    couplings: tuple[tuple[int, Coupling], ...] = ()
+    aerodynamics: Aerodynamics | None = None
+    forced: tuple[int, ...] = ()
 
     @property
     def wheelset_positions(self) -> NDArray[np.float64]:
@@ -66,17 +74,23 @@ class Parts:
         return np.concatenate(rows)
 
     @property
+    def wheel_radii(self) -> tuple[float, ...]:
+        """r0 of every wheelset, the leading one first [m]."""
+        return tuple(v.wheel_radius for v in self.vehicles for _ in v.axle_positions)
+
+    @property
     def wheel_span(self) -> float:
         """Distance between the outer wheelsets [m]."""
         return float(np.ptp(self.wheelset_positions))
 
 
-def collect_presets(train: Train, track: Track, presets: Presets, folder: Path | None) -> Presets:
+def collect_presets(train: Train, track: Track, wind: BlowingWind, presets: Presets, folder: Path | None) -> Presets:
     """Copy every preset that a scenario names into it.
 
     Args:
         train: Train table; names vehicles and wheel profile.
         track: Track table; names rail, rail profile, slab and fastening.
+        wind: Wind table; names coefficients.
         presets: Presets of the scenario; they are not looked up again.
         folder: Where relative paths start.
 
@@ -90,7 +104,7 @@ def collect_presets(train: Train, track: Track, presets: Presets, folder: Path |
         if kind not in KINDS:
             raise InputError(f"presets.{kind}: unknown kind of preset{nearest(kind, KINDS)}")
     found = {kind: dict(tables) for kind, tables in presets.items()}
-    for where, kind, part in _references(train, track):
+    for where, kind, part in _references(train, track, wind):
         stated: dict[str, Any] = {} if isinstance(part, str) else part
         name = part if isinstance(part, str) else part.get("like")
         tables = found.setdefault(kind, {})
@@ -108,16 +122,17 @@ def collect_presets(train: Train, track: Track, presets: Presets, folder: Path |
     return found
 
 
-def used_presets(train: Train, track: Track, presets: Presets) -> Presets:
+def used_presets(train: Train, track: Track, wind: BlowingWind, presets: Presets) -> Presets:
     """Presets that a scenario refers to, out of those of many scenarios.
 
     Args:
         train: The train's table.
         track: The track's table.
+        wind: The wind's table.
         presets: Result of :func:`collect_presets`, of this scenario and of others.
     """
     found: Presets = {}
-    for _, kind, part in _references(train, track):
+    for _, kind, part in _references(train, track, wind):
         name = part if isinstance(part, str) else part.get("like")
         while name in presets.get(kind, {}) and name not in found.setdefault(kind, {}):
             found[kind][name] = presets[kind][name]
@@ -125,12 +140,13 @@ def used_presets(train: Train, track: Track, presets: Presets) -> Presets:
     return found
 
 
-def build_parts(train: Train, track: Track, presets: Presets) -> Parts:
+def build_parts(train: Train, track: Track, wind: BlowingWind, presets: Presets) -> Parts:
     """Build and check every part.
 
     Args:
         train: The train's table.
         track: The track's table.
+        wind: The wind's table.
         presets: Result of :func:`collect_presets`; other names are read from the library.
 
     Returns:
@@ -139,8 +155,8 @@ def build_parts(train: Train, track: Track, presets: Presets) -> Parts:
     Raises:
         InputError: The first value that breaks a rule, as ``train.vehicles[0].car.mass = -1: ...``.
     """
-    presets = collect_presets(train, track, presets, None)
-    tables = {where: _resolved(kind, part, presets) for where, kind, part in _references(train, track)}
+    presets = collect_presets(train, track, wind, presets, None)
+    tables = {where: _resolved(kind, part, presets) for where, kind, part in _references(train, track, wind)}
     vehicles = []
     for i in range(len(train.vehicles)):
         table = tables[f"train.vehicles[{i}]"]
@@ -164,18 +180,27 @@ def build_parts(train: Train, track: Track, presets: Presets) -> Parts:
         slab=build(Slab, slab_table, "track.slab"),
         mortar=mortar,
         fastening=build(Fastening, tables["track.fastening"], "track.fastening"),
+        couplings=_couplings(train, vehicles, tables),
+        aerodynamics=_aerodynamics(wind, vehicles, tables),
+        forced=tuple(
+            _body(vehicles, entry.vehicle, entry.body, f"train.forces[{i}]") for i, entry in enumerate(train.forces)
+        ),
     )
 
 
-def _references(train: Train, track: Track) -> Iterator[tuple[str, str, str | dict[str, Any]]]:
+def _references(train: Train, track: Track, wind: BlowingWind) -> Iterator[tuple[str, str, str | dict[str, Any]]]:
     """Key, kind and value of every part that a scenario refers to."""
     for i, vehicle in enumerate(train.vehicles):
         yield f"train.vehicles[{i}]", "vehicles", vehicle
+    for i, coupled in enumerate(train.couplings):
+        yield f"train.couplings[{i}].part", "couplings", coupled.part
     yield "train.wheel_profile", "profiles", train.wheel_profile
     yield "track.rail", "rails", track.rail
     yield "track.rail_profile", "profiles", track.rail_profile
     yield "track.slab", "slabs", track.slab
     yield "track.fastening", "fastenings", track.fastening
+    if wind.speed is not None:
+        yield "wind.aerodynamics", "aerodynamics", wind.aerodynamics
 
 
 def _read(where: str, kind: str, name: str, folder: Path | None, stated: Mapping[str, Any]) -> dict[str, Any]:
@@ -209,6 +234,45 @@ def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
         merged[key] = _merged(merged[key], value) if both else value
     return merged
+
+
+def _aerodynamics(
+    wind: BlowingWind, vehicles: list[Vehicle], tables: Mapping[str, dict[str, Any]]
+) -> Aerodynamics | None:
+    """Coefficients of the car bodies; None without wind."""
+    if wind.speed is None:
+        return None
+    for number in range(1, len(vehicles) + 1) if wind.vehicles == "all" else wind.vehicles:
+        _body(vehicles, number, wind.body, "wind", "vehicles")
+    return build(Aerodynamics, to_tuples(tables["wind.aerodynamics"], "wind.aerodynamics"), "wind.aerodynamics")
+
+
+def _body(vehicles: list[Vehicle], number: int, name: str, where: str, key: str = "vehicle") -> int:
+    """Number in the train of a body of a vehicle, which is counted from 1."""
+    if number > len(vehicles):
+        raise InputError(f"{where}.{key} = {number}: must be a number from 1 to {len(vehicles)}")
+    names = [body.name for body in vehicles[number - 1].body]
+    if name not in names:
+        raise InputError(f"{where}.body = {name!r}: no such body of vehicle {number}{nearest(name, names)}")
+    return sum(len(vehicle.body) for vehicle in vehicles[: number - 1]) + names.index(name)
+
+
+def _couplings(
+    train: Train, vehicles: list[Vehicle], tables: Mapping[str, dict[str, Any]]
+) -> tuple[tuple[int, Coupling], ...]:
+    """Couplings behind the vehicles that have them."""
+    found = []
+    for i, entry in enumerate(train.couplings):
+        where = f"train.couplings[{i}]"
+        behind = tuple(range(1, len(vehicles))) if entry.behind == "all" else entry.behind
+        if not behind or max(behind) >= len(vehicles):
+            rule = f"must be numbers from 1 to {len(vehicles) - 1}" if len(vehicles) > 1 else "needs two vehicles"
+            raise InputError(f"{where}.behind = {entry.behind if entry.behind == 'all' else list(behind)!r}: {rule}")
+        coupling = build(Coupling, to_tuples(tables[f"{where}.part"], f"{where}.part"), f"{where}.part")
+        for k in behind:
+            coupling.check_bodies(vehicles[k - 1], vehicles[k], f"{where}.part")
+            found.append((k - 1, coupling))
+    return tuple(found)
 
 
 def _centres(vehicles: list[Vehicle], train: Train) -> NDArray[np.float64]:

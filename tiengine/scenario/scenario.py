@@ -20,16 +20,17 @@ from tiengine.irregularity.irregularity import IrregularityParams
 from tiengine.irregularity.track_checks import check_wave
 from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
-from tiengine.parameters.input_files import load_toml, to_tuples, user_path
+from tiengine.parameters.input_files import load_toml, to_tuples
 from tiengine.parameters.presets import find_preset
 from tiengine.parameters.quantity import Params, PlainName, Source, build
 from tiengine.scenario.ensemble import Ensemble
 from tiengine.scenario.event_policy import Events
+from tiengine.scenario.file_paths import absolute_files, absolute_vary
 from tiengine.scenario.gauges import Gauge, check_gauges
 from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
-from tiengine.scenario.tables import Contact, Numerics, Output, Track, Train
-from tiengine.track.alignment_file import read_alignment
+from tiengine.scenario.shape_checks import check_shapes
+from tiengine.scenario.tables import BlowingWind, Contact, Numerics, Output, Track, Train
 from tiengine.track.baseplate import check_baseplate
 from tiengine.track.defects import check_defects
 from tiengine.track.knots import graded_knots
@@ -63,6 +64,7 @@ class Scenario(Params):
     track: Track = Track()
     irregularity: IrregularityParams = IrregularityParams()
     contact: Contact = Contact()
+    wind: BlowingWind = BlowingWind()
     numerics: Numerics = Numerics()
     output: Output = Output()
     gauges: Annotated[tuple[Gauge, ...], Field(max_length=1000)] = ()
@@ -78,7 +80,7 @@ class Scenario(Params):
     @cached_property
     def parts(self) -> Parts:
         """Parts that the scenario refers to, built and checked once."""
-        return build_parts(self.train, self.track, self.presets)
+        return build_parts(self.train, self.track, self.wind, self.presets)
 
     @cached_property
     def window_length(self) -> float:
@@ -131,14 +133,14 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
         path = find_preset("scenarios", str(source), called="scenario")
         folder, tables = path.parent, load_toml(path)
         tables.setdefault("name", path.stem)
-    tables = _with_alignment(_absolute(apply_overrides(tables, overrides, Scenario), folder), folder)
+    tables = absolute_files(apply_overrides(tables, overrides, Scenario), folder)
     scenario = build(Scenario, tables)
-    ensemble = _absolute_vary(scenario.ensemble, folder)
-    presets = collect_presets(scenario.train, scenario.track, scenario.presets, folder)
+    ensemble = absolute_vary(scenario.ensemble, folder)
+    presets = collect_presets(scenario.train, scenario.track, scenario.wind, scenario.presets, folder)
     if ensemble.vary:
         for i in range(ensemble.different):
             train = _changed(tables, ensemble, i)
-            presets |= collect_presets(train.train, train.track, presets, folder)
+            presets |= collect_presets(train.train, train.track, train.wind, presets, folder)
     scenario = scenario.model_copy(update={"presets": presets, "ensemble": ensemble})
     _check(scenario)
     _check_members(scenario)
@@ -195,42 +197,6 @@ def _is_random(track: IrregularityParams) -> bool:
     return track.short_wave or track.has_spectrum
 
 
-def _absolute_vary(ensemble: Ensemble, folder: Path | None) -> Ensemble:
-    """The ensemble with the paths of measured irregularities made absolute."""
-    files = ensemble.vary.get("irregularity.file")
-    if files is None:
-        return ensemble
-    found = tuple(_absolute({"irregularity": {"file": file}}, folder)["irregularity"]["file"] for file in files)
-    return ensemble.model_copy(update={"vary": {**ensemble.vary, "irregularity.file": found}})
-
-
-def _absolute(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
-    """The tables with the path of a measured irregularity made absolute, since it is read at every run."""
-    irregularity = tables.get("irregularity")
-    if not isinstance(irregularity, dict) or not isinstance(irregularity.get("file"), str):
-        return tables
-    name = irregularity["file"]
-    path = user_path(name, folder, "irregularity.file")
-    try:
-        path = path.resolve()
-    except (OSError, RuntimeError) as error:  # circular links
-        raise InputError(f"irregularity.file = {name!r}: {error}") from None
-    return {**tables, "irregularity": {**irregularity, "file": str(path)}}
-
-
-def _with_alignment(tables: dict[str, Any], folder: Path | None) -> dict[str, Any]:
-    """The tables with the rows of an alignment file in the place of its name."""
-    track = tables.get("track")
-    if not isinstance(track, dict) or not isinstance(track.get("alignment_file"), str):
-        return tables
-    name = track["alignment_file"]
-    if track.get("alignment_rows") or track.get("alignment"):
-        raise InputError(f"track.alignment_file = {name!r}: must not be set together with another alignment")
-    rows = read_alignment(user_path(name, folder, "track.alignment_file"), f"track.alignment_file = {name!r}")
-    kept = {key: value for key, value in track.items() if key != "alignment_file"}
-    return {**tables, "track": {**kept, "alignment_rows": rows}}
-
-
 def to_toml(scenario: Scenario) -> str:
     """Write the resolved scenario as TOML: every default and every preset used; it loads back equal.
 
@@ -250,6 +216,9 @@ def _check(scenario: Scenario) -> None:
             f" (wheels over {parts.wheel_span:g} m and {WINDOW_MARGIN_LEAST:g} m at either end)"
         )
     _check_trial_functions(scenario)
+    places = parts.wheelset_positions
+    lead = scenario.rear + scenario.centre_in_window + float(places.max())
+    check_shapes(scenario.track, scenario.train, scenario.numerics, len(places), lead)
     duration = scenario.train.distance / min(scenario.train.speed.speed)
     if duration > LONGEST_RUN:
         raise InputError(

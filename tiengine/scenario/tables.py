@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from tiengine.irregularity.rail_shapes import RailShape
+from tiengine.irregularity.wheel_shapes import WheelShape
 from tiengine.parameters.quantity import Params, Q
 from tiengine.result_files.channels import BODY, IRREGULARITY, WHEEL
 from tiengine.scenario.key_checks import channel_names, check_speed, number_or
@@ -21,11 +23,24 @@ from tiengine.track.defects import FailedFastenings
 from tiengine.track.knots import Grading
 from tiengine.track.mortar import MortarVoid
 from tiengine.vehicle.assembly import Effort
+from tiengine.vehicle.force_history import BodyForce
 from tiengine.vehicle.speed_programme import SpeedProfile
+from tiengine.vehicle.wind import Wind
 
-__all__ = ["Contact", "Numerics", "Output", "Track", "Train"]
+__all__ = ["BlowingWind", "Contact", "Numerics", "Output", "Track", "Train"]
 
 MOST_DEFECTS = 10_000  # of each kind
+MOST_SHAPES = 1000  # of rails, of wheels
+
+
+class Coupled(Params):
+    """Coupling of neighbouring vehicles, a part; several entries for the same vehicles add."""
+
+    part: Annotated[Part, Field(description="part: springs, dampers and stops between two vehicles")]
+    behind: Annotated[
+        tuple[Annotated[int, Q("-", "number", ge=1, le=64)], ...] | Literal["all"],
+        Field(description="vehicles behind which it lies, counted from the front from 1"),
+    ] = "all"
 
 
 class Train(Params):
@@ -64,7 +79,9 @@ class Train(Params):
         bool,
         Field(description="springs in series with dampers (k_series) are modelled; a vehicle may also set this itself"),
     ] = False
-
+    couplings: Annotated[tuple[Coupled, ...], Field(description="tables, see below", max_length=100)] = ()
+    wheel_shapes: Annotated[tuple[WheelShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
+    forces: Annotated[tuple[BodyForce, ...], Field(description="tables, see below", max_length=1000)] = ()
     effort: Annotated[
         Effort,
         Field(
@@ -128,6 +145,7 @@ class Track(Params):
     mortar_voids: Annotated[
         tuple[MortarVoid, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
+    rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
 
     @property
     def line(self) -> Alignment | None:
@@ -141,6 +159,18 @@ def _line(
 ) -> Alignment | None:
     """Line once per value; ``Track.line`` is read many times."""
     return alignment_of(elements, rows, rounding)
+
+
+class BlowingWind(Wind):
+    """Wind on car bodies; absent without its `speed`.
+
+    `speed` is a number, or rows between which it is interpolated smoothly: over the chainage of each car's middle, or
+    over time; the first and last hold beyond them. With a `gust` it is the speed of the mean wind, and the gust of
+    EN 14067-6 ("Chinese hat") stands at `gust_at`: its top is 1.6946 times the mean wind, and it is averaged over the
+    length of each car. Numbers of the gust are from memory.
+    """
+
+    aerodynamics: Annotated[Part, Field(description="part: coefficients of the car bodies")] = "EMU_lead"
 
 
 class Contact(Params):

@@ -21,6 +21,8 @@ from tiengine.engine.state import State
 from tiengine.engine.stepper import Plan, Stepper
 from tiengine.engine.time_step import prepare
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
+from tiengine.irregularity.rail_shapes import RailShapes
+from tiengine.irregularity.shaped_channels import ShapedChannels
 from tiengine.irregularity.track_checks import check_reach
 from tiengine.model.constant_data import Model
 from tiengine.recording.guards import Guard
@@ -70,6 +72,7 @@ class Run:
         steps: Steps that each train has made, by its place.
         alive: Places of the trains that have not failed.
         position: Chainage of the first vehicle's centre [m].
+        shapes: Shapes of rails and wheels; None without any.
         done: Steps so far.
         timer: Hooks for a profiler.
     """
@@ -84,6 +87,7 @@ class Run:
     steps: NDArray[np.int64]
     alive: list[int]
     position: float
+    shapes: ShapedChannels | None = None
     done: int = 0
     timer: LoopTimer = field(default_factory=LoopTimer)
 
@@ -132,7 +136,8 @@ class Run:
         guard = Guard.watching(stepper, scenario.events, np.array([track.end for track in tracks]))
         places = list(range(len(task.trains)))
         steps = np.zeros(len(places), np.int64)
-        return cls(task, stepper, recorder, trackside, tracks, jit, guard, steps, places, start)
+        shapes = _shapes(scenario, model, start)
+        return cls(task, stepper, recorder, trackside, tracks, jit, guard, steps, places, start, shapes)
 
     @property
     def labels(self) -> TrainLabels:
@@ -187,6 +192,8 @@ class Run:
         self.timer.lap("window and seats")
         wheels = x[:, None] + ingredients.train.wheelset_x
         irregularity = np.stack([track.sample(wheels) for track in self.tracks])
+        if self.shapes is not None:
+            irregularity = self.shapes.joined(irregularity, self.tracks, wheels)
         self.timer.lap("irregularity")
         time = ingredients.newmark.dt * np.arange(self.done + 1.0, self.done + count + 1.0)
         given = ingredients.given_loads(time, x, V, V_rate)
@@ -230,6 +237,14 @@ class Run:
             }
             for b, number in enumerate(self.task.trains)
         }
+
+
+def _shapes(scenario: Scenario, model: Model, start: float) -> ShapedChannels | None:
+    """Shapes of rails and wheels, for a run that starts at the given chainage of the first vehicle's centre [m]."""
+    train = model.ingredients.train
+    if not model.ingredients.shaped:
+        return None
+    return ShapedChannels(RailShapes(scenario.track.rail_shapes), start + train.wheelset_x, train.wheel_radius)
 
 
 def _started(scenario: Scenario, model: Model) -> State:

@@ -112,7 +112,7 @@ class Design:
             raise InputError(f"{self.plan.name}: the plan has no scenario; it can only be evaluated by a function")
         tables = to_tuples(self.base.model_dump(exclude_none=True))
         made = build(Scenario, apply_overrides(tables, self.points[point].changes, Scenario))
-        return made.model_copy(update={"presets": used_presets(made.train, made.track, made.presets)})
+        return made.model_copy(update={"presets": used_presets(made.train, made.track, made.wind, made.presets)})
 
     def _track(self, member: Member) -> IrregularityParams:
         """Irregularity of one member."""

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from tiengine.parameters.errors import InputError
 from tiengine.vehicle.connector import Body, Damper, Direction, Joint, Spring, end_motion
+from tiengine.vehicle.coupling import Coupling, placed
 from tiengine.vehicle.preload import LoadedSpring
 from tiengine.vehicle.vehicle import Vehicle
 
@@ -55,17 +56,18 @@ class PlacedBody(NamedTuple):
 
 
 class Element(NamedTuple):
-    """Nonlinear element: name, columns and row of its elongation, kind, odd force table."""
+    """Nonlinear element: name, columns and row of its elongation, kind, odd table, whether it lies between cars."""
 
     name: str
     columns: NDArray[np.intp]
     row: NDArray[np.float64]
     kind: int
     table: NDArray[np.float64]
+    between_cars: bool = False
 
     @property
     def slope(self) -> float:
-        """Initial slope of the table, part of C or K [N s/m, N/m]."""
+        """Initial slope of the table, part of C or K but for elements between cars [N s/m, N/m]."""
         return float(self.table[1, 1] / self.table[1, 0])
 
 
@@ -125,9 +127,43 @@ class Assembly:
             row = B[_AXES[stop.direction]]
             self._add_element(self.K, prefix + stop.name, columns, row, _FORCE_OF_ELONGATION, stop.table)
 
-    def _elongation(self, joint: Joint, index: dict[str, int]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def add_coupling(
+        self,
+        coupling: Coupling,
+        indices: tuple[dict[str, int], dict[str, int]],
+        plane: tuple[float, float],
+        prefix: str,
+    ) -> None:
+        """Add the connectors between two vehicles, all of them as elements: C and K couple no two vehicles.
+
+        Args:
+            coupling: The coupling.
+            indices: Bodies of the vehicle ahead and of the one behind, by name.
+            plane: x of the coupling plane in either [m].
+            prefix: Prefix of the names of its elements.
+        """
+        kinds = {_FORCE_OF_ELONGATION: "stiffness", _FORCE_OF_RATE: "damping"}
+        for spring in coupling.spring:
+            columns, B = self._elongation(placed(spring, *plane), *indices)
+            for kind, numbers in kinds.items():
+                for row, value in zip(B, getattr(spring, numbers), strict=True):
+                    if value > 0.0:
+                        table = np.array([[0.0, 0.0], [1.0, value]])
+                        self.elements.append(Element(prefix + spring.name, columns, row, kind, table, True))
+        for damper in coupling.damper:
+            columns, B = self._elongation(placed(damper, *plane), *indices)
+            row = B[_AXES[damper.direction]]
+            self.elements.append(Element(prefix + damper.name, columns, row, _FORCE_OF_RATE, damper.table, True))
+        for stop in coupling.stop:
+            columns, B = self._elongation(placed(stop, *plane), *indices)
+            row = B[_AXES[stop.direction]]
+            self.elements.append(Element(prefix + stop.name, columns, row, _FORCE_OF_ELONGATION, stop.table, True))
+
+    def _elongation(
+        self, joint: Joint, index: dict[str, int], behind: dict[str, int] | None = None
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Columns of both bodies (12,) and the derivatives of the six elongations by them (6, 12)."""
-        a, b = index[joint.a], index[joint.b]
+        a, b = index[joint.a], (index if behind is None else behind)[joint.b]
         columns = np.concatenate([6 * a + np.arange(6), 6 * b + np.arange(6)])
         motion_a = end_motion(self.bodies[a].body, joint.point_a)
         motion_b = end_motion(self.bodies[b].body, joint.point_b)

@@ -25,6 +25,7 @@ from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.vehicle.assembly import Assembly, Effort, Element, PlacedBody, grade_push, longitudinal_push, spin_push
 from tiengine.vehicle.connector import extend_table
+from tiengine.vehicle.coupling import Coupling
 from tiengine.vehicle.preload import leaning_stiffness
 from tiengine.vehicle.vehicle import Vehicle
 
@@ -76,9 +77,10 @@ class TrainModel:
         element_index: Coordinates of each nonlinear element, unused 0, shape (n_e, 12).
         element_row: Elongation = row . u, unused 0, shape (n_e, 12).
         element_kind: 0 force of the rate, 1 force of the elongation, shape (n_e,).
-        element_linear: Slope that is already part of C or K, shape (n_e,).
+        element_linear: Slope that is already part of C or K, zero between vehicles, shape (n_e,).
         element_table: Points (abscissa, force) of an odd law from zero on, shape (n_e, points, 2).
         element_names: Name of each element.
+        element_between_cars: Whether it joins two vehicles; its whole law is then the element's, shape (n_e,).
     """
 
     n_dof: int
@@ -109,6 +111,7 @@ class TrainModel:
     element_linear: NDArray[np.float64]
     element_table: NDArray[np.float64]
     element_names: tuple[str, ...]
+    element_between_cars: NDArray[np.bool_]
 
     def dof(self, body: str, motion: str) -> int:
         """Return the index of a coordinate of a body, e.g. ``dof("car", "z")``."""
@@ -137,6 +140,7 @@ def assemble(
     *,
     series_springs: bool | None = None,
     effort: Effort = "wheels",
+    couplings: Sequence[tuple[int, Coupling]] = (),
 ) -> TrainModel:
     """Assemble the matrices and nonlinear elements of a train.
 
@@ -145,6 +149,7 @@ def assemble(
         centres: Centre of each vehicle relative to the first's, forward [m]; from the coupler lengths if None.
         series_springs: Every damper with ``k_series`` gets an internal state; None: as each vehicle states.
         effort: Where the force that changes the speed acts.
+        couplings: Couplings, each with the number of the vehicle ahead, from 0.
 
     Returns:
         The train.
@@ -165,8 +170,25 @@ def assemble(
         prefix = f"v{k + 1} " if len(vehicles) > 1 else ""
         full.add_vehicle(vehicle, first, series[k], prefix)
         first += len(vehicle.body)
+    _couple(full, vehicles, centres, couplings)
     push = longitudinal_push(full) + spin_push(full, vehicles, effort)
     return _reduce(full, vehicles, centres, push, grade_push(full, vehicles, effort))
+
+
+def _couple(
+    full: Assembly,
+    vehicles: Sequence[Vehicle],
+    centres: NDArray[np.float64],
+    couplings: Sequence[tuple[int, Coupling]],
+) -> None:
+    """Add couplings; the plane in which two vehicles meet divides their distance as their lengths do."""
+    firsts = np.cumsum([0, *(len(vehicle.body) for vehicle in vehicles)])
+    for k, coupling in couplings:
+        ahead, behind = vehicles[k], vehicles[k + 1]
+        index = tuple({body.name: int(firsts[i]) + m for m, body in enumerate(vehicles[i].body)} for i in (k, k + 1))
+        gap, share = float(centres[k] - centres[k + 1]), ahead.length / (ahead.length + behind.length)
+        plane = (-gap * share, gap * (1.0 - share))
+        full.add_coupling(coupling, (index[0], index[1]), plane, f"v{k + 1}-v{k + 2} ")
 
 
 def _check_centres(vehicles: Sequence[Vehicle], centres: NDArray[np.float64]) -> None:
@@ -240,9 +262,10 @@ def _reduce(
         element_index=index,
         element_row=row,
         element_kind=np.array([element.kind for element in full.elements], dtype=np.int32),
-        element_linear=np.array([element.slope for element in full.elements]),
+        element_linear=np.array([0.0 if element.between_cars else element.slope for element in full.elements]),
         element_table=table,
         element_names=tuple(element.name for element in full.elements),
+        element_between_cars=np.array([element.between_cars for element in full.elements], dtype=np.bool_),
     )
 
 

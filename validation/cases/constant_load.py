@@ -121,7 +121,7 @@ def _wheelset(given: Ingredients) -> TrainModel:
         K_leaning=none, grade_force=np.zeros((5, 1)),
         element_index=np.zeros((0, 12), dtype=np.int32), element_row=np.zeros((0, 12)),
         element_kind=np.zeros(0, dtype=np.int32), element_linear=np.zeros(0), element_table=np.zeros((0, 2, 2)),
-        element_names=(),
+        element_names=(), element_between_cars=np.zeros(0, dtype=np.bool_),
     )  # fmt: skip
 
 

@@ -81,6 +81,15 @@ def prepare(scenario: Scenario, numerics: FullLength, steps: int, body_rows: int
     """Build the track, start from steady rolling, and bind the kernels to buffers of so many steps."""
     if not scenario.train.speed.is_constant:
         raise InputError("train.speed_kmh: must be one number in the full-length model")
+    refused = (
+        ("wind", scenario.wind.speed is not None),
+        ("train.forces", scenario.train.forces),
+        ("track.rail_shapes", scenario.track.rail_shapes),
+        ("train.wheel_shapes", scenario.train.wheel_shapes),
+    )
+    for key, given_key in refused:
+        if given_key:
+            raise InputError(f"{key}: must be left out in the full-length model")
     if scenario.numerics.start != "equilibrium":
         raise InputError('numerics.start = "zero": must be "equilibrium" in the full-length model')
     backend.start(1)

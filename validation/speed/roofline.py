@@ -1,8 +1,9 @@
 """Stages of the spline step against the machine's roofline: one car, sixteen trains of one car, one train of eight.
 
 A stage runs in launches of its own, on the state at the beginning of a block of steps; the time of launches that do
-nothing is taken off. Caches are warmer than in the whole step. The wheels, whose iterations need a state that moves,
-get what the other stages leave of launches that do everything, so that the stages add up to the kernel.
+nothing is taken off. Times are the best of some repeats, as the roofs are; caches are warmer than in the loop. The
+wheels, whose iterations need a state that moves, get what the other stages leave of launches that do everything, so
+that the stages add up to the kernel.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.engine.spline_stepper import SplineStepper
@@ -139,9 +139,9 @@ def stage_times(bench: Bench, stages: dict[str, int]) -> tuple[float, dict[str, 
     others = {name: bits for name, bits in stages.items() if bits != at.CONTACT_STAGE}
     masks = {"nothing": 0, "everything": at.ALL_STAGES, **others}
     taken = [{name: spent(mask, LAUNCH_STEPS, before) for name, mask in masks.items()} for _ in range(REPEATS)]
-    launch_us = float(np.median([spent(0, 1, after) for _ in range(REPEATS)]))
+    launch_us = min(spent(0, 1, after) for _ in range(REPEATS))
     launch.job[at.STAGES] = at.ALL_STAGES
-    us = {name: float(np.median([each[name] for each in taken])) for name in masks}
+    us = {name: min(each[name] for each in taken) for name in masks}
     found = {name: max(0.0, us[name] - us["nothing"]) / LAUNCH_STEPS for name in ("everything", *others)}
     whole = found.pop("everything")
     return launch_us, found | {"wheels": max(0.0, whole - sum(found.values()))}
