@@ -20,6 +20,7 @@ from tiengine.irregularity.irregularity import IrregularityParams
 from tiengine.irregularity.track_checks import check_wave
 from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
+from tiengine.parameters.html_rows import html_rows
 from tiengine.parameters.input_files import load_toml, to_tuples
 from tiengine.parameters.presets import find_preset
 from tiengine.parameters.quantity import Params, PlainName, Source, build
@@ -71,6 +72,14 @@ class Scenario(Params):
     events: Events = Events()
     ensemble: Ensemble = Ensemble()
     presets: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
+
+    def _repr_html_(self) -> str:
+        """Table for notebooks: what the scenario states itself."""
+        rows = [("scenario", self.name)]
+        for key in ("train", "track", "irregularity", "contact", "numerics", "output", "ensemble"):
+            stated = getattr(self, key).model_dump(exclude_defaults=True)
+            rows += [(f"{key}.{name}", str(value)) for name, value in stated.items()]
+        return html_rows(rows)
 
     @cached_property
     def members(self) -> tuple[Scenario, ...]:
@@ -167,6 +176,7 @@ def _members(scenario: Scenario) -> tuple[Scenario, ...]:
         key = repr(ensemble.changes(i))
         if key not in made:
             made[key] = _changed(tables, ensemble, i)
+            _ = made[key].parts  # kept with the scenario and in its copies
         train = made[key]
         if "irregularity.seed" not in ensemble.vary:
             seeded = train.irregularity.model_copy(update={"seed": ensemble.seed(i, first)})
