@@ -54,8 +54,8 @@ def test_wheels_over_a_cosine():
     """The kinematics of a rigid wheel: 4.86 Hz and A/2 (2 pi V/L)^2 = 4.66 m/s^2 (a pure wave of 10 mm in 20 m).
 
     Less what the seats do on even ground, from 3 m beyond either end of the wave, where its acceleration sets in with a
-    step. The largest within 5 %: the track gives way under the wheel's own inertia; all along within 15 %: slabs meet at
-    a slight angle, since their free ends have no moment.
+    step. The largest within 5 %: the track gives way under the wheel's own inertia; all along within 15 %: slabs meet
+    at a slight angle, since their free ends have no moment.
     """
     changes = ["train.distance=45", "train.start=70", "irregularity.spectrum='none'", "irregularity.taper=5"]
     table = f"track.settlements=[{{kind='cosine', at={AT}, length={LENGTH}, depth={DEPTH}}}]"

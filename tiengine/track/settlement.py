@@ -1,8 +1,8 @@
 """Ground that has settled or heaved under the slabs, and the shape that it leaves to the rails (MODEL §14).
 
-The bed of the slabs is displaced by z_g(x) and presses with k_m (w - z_g). As it transmits tension, the track is
-linear: the rails lie in a static shape, that of slabs and rails on the displaced bed, and the train moves them from there as
-it moves those of an even track. To a wheel the static shape is one of the running surface.
+The bed of the slabs is displaced by z_g(x) and presses with k_m (w - z_g). It transmits tension, so that the track is
+linear: the rails lie in a static shape, that of slabs and rails on the displaced bed, and the train moves them from
+there as it moves those of an even track. To a wheel the static shape is one of the running surface.
 
     K q = f,   f = int N^T k_m z_g of every slab,   no train, at rest
 """
