@@ -21,7 +21,7 @@ from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
 
-__all__ = ["RailShape", "RailShapes", "check_rail_shapes"]
+__all__ = ["RailShape", "RailShapes", "SettledRail", "check_rail_shapes"]
 
 SIDES = {"left": (0,), "right": (1,), "both": (0, 1)}
 STEP = 1e-3  # m between the points of a filtered shape: a sixth of the patch
@@ -158,6 +158,28 @@ def _series(shape: RailShape, where: str) -> _Sampled:
     return _Sampled(even, fitted * grown)
 
 
+class SettledRail:
+    """Static shape of both rails over settled ground, a spline between two chainages."""
+
+    shortest = float("inf")
+
+    def __init__(self, start: float, end: float, shape: CubicSpline) -> None:
+        """Keep the shape.
+
+        Args:
+            start: Chainage from which it holds [m]; zero before.
+            end: Up to which it holds [m].
+            shape: Height over chainage [m].
+        """
+        self._start, self._end, self._value, self._slope = start, end, shape, shape.derivative()
+
+    def evaluate(self, x: Reals) -> tuple[Reals, Reals]:
+        """Heights [m] and slopes at chainages [m], shape (n,) each."""
+        inside = (x > self._start) & (x < self._end)
+        clipped = np.clip(x, self._start, self._end)
+        return np.where(inside, self._value(clipped), 0.0), np.where(inside, self._slope(clipped), 0.0)
+
+
 class RailShapes:
     """All shapes of both rails.
 
@@ -165,11 +187,12 @@ class RailShapes:
         waves: Shortest wave of each shape [m], in the order of the scenario.
     """
 
-    def __init__(self, shapes: Sequence[RailShape]) -> None:
+    def __init__(self, shapes: Sequence[RailShape], settled: Sequence[SettledRail] = ()) -> None:
         """Read files and filter shapes.
 
         Args:
             shapes: Entries of the scenario.
+            settled: Shapes of both rails over settled ground.
 
         Raises:
             InputError: A file breaks a rule.
@@ -179,7 +202,9 @@ class RailShapes:
             where = f"track.rail_shapes[{i}]"
             made.append((shape, _made(shape, where)))
         self.waves = tuple(heights.shortest for _, heights in made)
-        self._sides = tuple([heights for shape, heights in made if side in SIDES[shape.rail]] for side in range(2))
+        self._sides = tuple(
+            [*(heights for shape, heights in made if side in SIDES[shape.rail]), *settled] for side in range(2)
+        )
 
     def sample(self, x: Reals) -> tuple[Reals, Reals]:
         """Heights [m] and slopes of the left and right rail at chainages [m] of any shape; shape (..., 2) each."""

@@ -228,7 +228,7 @@ def _check(scenario: Scenario) -> None:
     _check_trial_functions(scenario)
     places = parts.wheelset_positions
     lead = scenario.rear + scenario.centre_in_window + float(places.max())
-    check_shapes(scenario.track, scenario.train, scenario.numerics, len(places), lead)
+    check_shapes(scenario.track, scenario.train, scenario.numerics, len(places), lead, parts.mortar.no_tension)
     duration = scenario.train.distance / min(scenario.train.speed.speed)
     if duration > LONGEST_RUN:
         raise InputError(

@@ -6,11 +6,14 @@ from tiengine.irregularity.rail_shapes import check_rail_shapes
 from tiengine.irregularity.wheel_shapes import check_wheel_shapes
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.tables import Numerics, Track, Train
+from tiengine.track.settlement import check_settlements
 
 __all__ = ["check_shapes"]
 
 
-def check_shapes(track: Track, train: Train, numerics: Numerics, wheelsets: int, begin: float) -> None:
+def check_shapes(
+    track: Track, train: Train, numerics: Numerics, wheelsets: int, begin: float, no_tension: bool
+) -> None:
     """Check that shapes of rails and wheels belong to rails and wheels of the run, and that its step knows them.
 
     Args:
@@ -19,12 +22,18 @@ def check_shapes(track: Track, train: Train, numerics: Numerics, wheelsets: int,
         numerics: Tell the kind of step.
         wheelsets: Wheelsets of the train.
         begin: Chainage of the leading wheel at the start [m].
+        no_tension: Whether the slab's bed transmits no tension.
 
     Raises:
         InputError: Names the key, its value and the rule.
     """
     check_rail_shapes(track.rail_shapes, begin=begin, end=begin + train.distance)
+    check_settlements(track.settlements, begin=begin, end=begin + train.distance, no_tension=no_tension)
     check_wheel_shapes(train.wheel_shapes, wheelsets)
-    for key, given in (("track.rail_shapes", track.rail_shapes), ("train.wheel_shapes", train.wheel_shapes)):
+    for key, given in (
+        ("track.rail_shapes", track.rail_shapes),
+        ("track.settlements", track.settlements),
+        ("train.wheel_shapes", train.wheel_shapes),
+    ):
         if given and numerics.trial_functions == "sines":
             raise InputError(f'{key}: must be left out with numerics.trial_functions = "sines"; splines know them')

@@ -22,6 +22,7 @@ from tiengine.track.alignment_file import MOST_ROWS
 from tiengine.track.defects import FailedFastenings
 from tiengine.track.knots import Grading
 from tiengine.track.mortar import MortarVoid
+from tiengine.track.settlement import Settlement
 from tiengine.vehicle.assembly import Effort
 from tiengine.vehicle.force_history import BodyForce
 from tiengine.vehicle.speed_programme import SpeedProfile
@@ -146,6 +147,8 @@ class Track(Params):
         tuple[MortarVoid, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
     rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
+
+    settlements: Annotated[tuple[Settlement, ...], Field(description="tables, see below", max_length=1000)] = ()
 
     @property
     def line(self) -> Alignment | None:

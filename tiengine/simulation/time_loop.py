@@ -21,7 +21,7 @@ from tiengine.engine.state import State
 from tiengine.engine.stepper import Plan, Stepper
 from tiengine.engine.time_step import prepare
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
-from tiengine.irregularity.rail_shapes import RailShapes
+from tiengine.irregularity.rail_shapes import RailShapes, SettledRail
 from tiengine.irregularity.shaped_channels import ShapedChannels
 from tiengine.irregularity.track_checks import check_reach
 from tiengine.model.constant_data import Model
@@ -32,6 +32,7 @@ from tiengine.result_files.layout import Block, TrainLabels
 from tiengine.scenario.scenario import Scenario
 from tiengine.simulation.messages import Advanced
 from tiengine.simulation.tasks import Task
+from tiengine.track.settlement import settled_rail
 
 __all__ = ["CHUNK_STEPS", "LoopTimer", "Run"]
 
@@ -244,7 +245,22 @@ def _shapes(scenario: Scenario, model: Model, start: float) -> ShapedChannels | 
     train = model.ingredients.train
     if not model.ingredients.shaped:
         return None
-    return ShapedChannels(RailShapes(scenario.track.rail_shapes), start + train.wheelset_x, train.wheel_radius)
+    g = model.ingredients
+    settled = [
+        SettledRail(
+            *settled_rail(
+                each,
+                g.rail,
+                g.fastening,
+                g.slab,
+                g.mortar.stiffness,
+                lambda slab: g.designs.matrices[g.designs.of_slab.get(slab, 0)],
+                g.seat_factors,
+            )
+        )
+        for each in scenario.track.settlements
+    ]
+    return ShapedChannels(RailShapes(scenario.track.rail_shapes, settled), start + train.wheelset_x, train.wheel_radius)
 
 
 def _started(scenario: Scenario, model: Model) -> State:
