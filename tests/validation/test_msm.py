@@ -111,6 +111,24 @@ def test_failed_fastenings_and_a_void_act_alike():
     assert np.ptp(full) > peak / 3.0  # the defects have an effect
 
 
+@pytest.mark.slow
+def test_two_patches_act_alike():
+    """Normal forces of both patches, to 1 % of the peak: a share is more sensitive than the sum (190 N per um).
+
+    S1002 on 60E1, the gauge narrowed by as much as the tape circles are closer together than in its own track: wheels
+    run about the jump of the contact on the tread, where both slots of the table carry.
+    """
+    words = (
+        "contact.patches=2", "train.wheel_profile=S1002", "track.rail_profile=60E1", "track.gauge=1.428",
+        "track.gauge_depth=0.014",
+    )  # fmt: skip
+    scenario = load_scenario("paper", [*SHORT, *words])
+    with run_full_length(scenario, FullLength(60.0, 2.0, ALL, 1e-4)) as full, run(scenario) as window:
+        N, other = (each.patch()["normal_force"] for each in (full, window))
+    assert (N > 1e3).all(axis=-1).any()
+    assert np.abs(N - other).max() < 1e-2 * N.max()
+
+
 @pytest.mark.parametrize(
     ("override", "said"),
     [
