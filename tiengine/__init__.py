@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tiengine.irregularity.track_function import TrackFunction as TrackFunction
     from tiengine.parameters.errors import InputError as InputError
+    from tiengine.report.live_progress import LiveProgress as LiveProgress
     from tiengine.result import Result as Result
     from tiengine.result import open as open
     from tiengine.scenario.scenario import load_scenario as load_scenario
@@ -21,10 +22,22 @@ if TYPE_CHECKING:
     from tiengine.study.study import study as study
 
 __version__ = metadata.version("tiengine")
-__all__ = ["InputError", "Result", "Study", "TrackFunction", "load_scenario", "open", "resume", "run", "study"]
+__all__ = [
+    "InputError",
+    "LiveProgress",
+    "Result",
+    "Study",
+    "TrackFunction",
+    "load_scenario",
+    "open",
+    "resume",
+    "run",
+    "study",
+]
 
 _HOMES = {
     "InputError": "tiengine.parameters.errors",
+    "LiveProgress": "tiengine.report.live_progress",
     "Result": "tiengine.result",
     "Study": "tiengine.study.study",
     "TrackFunction": "tiengine.irregularity.track_function",

@@ -5,6 +5,7 @@ Scenarios, indices and xarray are imported when first used: opening a file needs
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from tiengine.result_files.reader import Reader, open_file
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
     from tiengine.indices.metrics import Metrics
     from tiengine.scenario.scenario import Scenario
@@ -31,6 +33,30 @@ class Result(Reader):
             reader: Reader returned by a writer; must not be used afterwards.
         """
         return cls(reader.file, reader.name)
+
+    def _repr_html_(self) -> str:
+        """Table for notebooks: size, times and failures of the run."""
+        from tiengine.parameters.html_rows import html_rows
+        from tiengine.result_files.summary import summary
+
+        rows = [("result", self.name), ("status", str(self.attributes.get("status", ""))), *summary(self.attributes)]
+        return html_rows([*rows, *((f"train {train}", why) for train, why in list(self.failures.items())[:20])])
+
+    def plot(self, kind: str, train: int = 0, *, other: Result | None = None) -> Figure:
+        """Draw a figure, which a notebook shows; its ``savefig`` writes it to a file.
+
+        Args:
+            kind: Kind of figure, as of ``tiengine plot``: ``"forces"``, ``"envelopes"``, ``"waterfall"``, ...
+            train: Index of the train.
+            other: Second result, for the kind ``"compare"``.
+
+        Raises:
+            InputError: There is no such kind, or the file lacks what it shows.
+        """
+        catalogue = import_module("tiengine.figures.catalogue")  # figures stand above results, which only name them
+        arguments = (train,) if other is None else (other, train)
+        figure: Figure = catalogue.kind_named(kind).draw(self, *arguments)
+        return figure
 
     @property
     def scenario(self) -> Scenario:

@@ -38,6 +38,19 @@ SHORTER = {
         "wheel.position[0] + 50.0": "wheel.position[0] + 1.0",
         "-o hundred.h5": "-o hundred.h5 --workers 1",
     },
+    "how_many_fastenings": {
+        "seeds = 10": "seeds = 1",
+        '"train.distance" = 60.0': '"train.distance" = 8.0',
+        '"train.start" = 80.0': '"train.start" = 108.0',
+        '"output.run_in" = 10.0': '"output.run_in" = 1.0',
+        "-o failed": "-o failed --workers 1",
+    },
+    "which_parameter": {
+        '"train.distance" = 30.0': '"train.distance" = 3.0',
+        '"output.run_in" = 5.0': '"output.run_in" = 0.5',
+        'method = "saltelli"\nsize = 16 ': 'method = "latin_hypercube"\nsize = 2 ',
+        "-o matters": "-o matters --workers 1",
+    },
     "through_a_curve": {"distance = 330.0": "distance = 15.0\n[output]\nrun_in = 2.0\n"},
     "full_length": {"train.distance=15": "train.distance=4"},
 }

@@ -95,14 +95,23 @@ def metrics(
     "--output",
     type=click.Path(path_type=Path),
     required=True,
-    help="File to write, ending in .csv, .parquet or .mat.",
+    help="File to write, ending in .csv, .parquet or .mat, or .pvd for ParaView.",
 )
 @click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Index of the train.")
 @click.option("--channel", "channels", multiple=True, help="GROUP or GROUP/CHANNEL; can be repeated; default: wheel.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def export(file: Path, output: Path, train: int, channels: Sequence[str], force: bool) -> None:
-    """Export channels of a result FILE to CSV, Parquet or MATLAB (docs/results.md)."""
+    """Export channels of a result FILE to CSV, Parquet or MATLAB, or the scene to VTK (docs/results.md)."""
     from tiengine import result as results
+
+    if output.suffix == ".pvd":
+        from tiengine.figures.vtk_series import write_vtk
+        from tiengine.result_files.output_file import check_output
+
+        check_output(output, force)
+        with results.open(file) as result:
+            click.echo(f"{output}: {write_vtk(result, output, train)} snapshots")
+        return
     from tiengine.result_files import export as exporting
 
     with results.open(file) as result:
@@ -148,6 +157,25 @@ def report(file: Path, output: Path | None, train: int | None) -> None:
     with results.open(file) as result:
         reporting.write(result, path, train)
     click.echo(str(path))
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Ends in .gif, .mp4 or .html; default: FILE.gif; replaced."
+)
+@click.option("--train", type=click.IntRange(0), default=0, show_default=True, help="Index of the train.")
+@click.option("--fps", type=int, default=20, show_default=True, help="Frames a second.")
+@click.option("--enlarged", type=float, default=500.0, show_default=True, help="Factor on deflections.")
+def animate(file: Path, output: Path | None, train: int, fps: int, enlarged: float) -> None:
+    """Show the train of a result FILE over its window: deflections, wheels that lift, forces as bars."""
+    from tiengine import result as results
+    from tiengine.figures import animation
+
+    path = output or file.with_suffix(".gif")
+    with results.open(file) as result:
+        frames = animation.animate(result, path, train, fps=fps, enlarged=enlarged)
+    click.echo(f"{path}: {frames} frames")
 
 
 def _text(value: Any) -> str:
@@ -221,5 +249,5 @@ def _measured_metrics(
     return Metrics(str(file), (train_metrics(ride),), {})
 
 
-COMMANDS = (info, metrics, plot, report, export)
+COMMANDS = (info, metrics, plot, animate, report, export)
 """Added to the group of :mod:`tiengine.cli.commands`."""

@@ -213,6 +213,29 @@ def merge(folder: Path, output: Path, force: bool) -> None:
     click.echo(f"{output}: {merge(Folder.open(folder), output, force=force)} trains")
 
 
+@study.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Ends in .zarr or .parquet.")
+@click.option("--length", type=float, default=10.0, show_default=True, help="Of a window [m]; [s] with --by-time.")
+@click.option("--step", type=float, default=5.0, show_default=True, help="From window to window, likewise.")
+@click.option("--samples", type=int, default=256, show_default=True, help="Samples of a window.")
+@click.option("--by-time", is_flag=True, help="Cut by time instead of distance.")
+@click.option("--channel", "channels", multiple=True, metavar="GROUP/CHANNEL", help="To learn; default: wheel forces.")
+@click.option("--input", "inputs", multiple=True, metavar="GROUP/CHANNEL", help="Default: the irregularity.")
+@click.option("--label", "labels", multiple=True, metavar="COLUMN", help="Column of the table, besides the factors.")
+def dataset(
+    folder: Path, output: Path, channels: Sequence[str], inputs: Sequence[str], labels: Sequence[str], **cut: Any
+) -> None:
+    """Cut the trains of the study in FOLDER into windows for learning, split by seed, with a datasheet."""
+    from tiengine.study.dataset import Windows, make_dataset
+    from tiengine.study.folder import Folder
+
+    chosen: dict[str, Any] = {"channels": tuple(channels), "inputs": tuple(inputs), "labels": tuple(labels)}
+    windows = Windows(**cut, **{name: value for name, value in chosen.items() if value})
+    counts = make_dataset(Folder.open(folder), output, windows)
+    click.echo(f"{output}: {', '.join(f'{count} windows for {name}' for name, count in counts.items())}")
+
+
 COMMANDS = (study,)
 
 

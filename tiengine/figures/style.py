@@ -75,6 +75,14 @@ def in_style(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return styled
 
 
+class Picture(Figure):
+    """Figure that a notebook shows as it is saved."""
+
+    def _repr_png_(self) -> bytes:
+        """PNG file, as notebooks ask for it."""
+        return png(self)
+
+
 def new_figure(height: float, caption: str = "") -> Figure:
     """Create an empty figure of the standard width.
 
@@ -82,7 +90,7 @@ def new_figure(height: float, caption: str = "") -> Figure:
         height: Height [cm].
         caption: Small text above the figure that says where the numbers come from.
     """
-    figure = Figure(figsize=(WIDTH * CENTIMETRE, height * CENTIMETRE), layout="constrained")
+    figure = Picture(figsize=(WIDTH * CENTIMETRE, height * CENTIMETRE), layout="constrained")
     FigureCanvasAgg(figure)
     if caption:
         figure.suptitle(plain(caption), x=0.01, ha="left", fontsize=7.0, color="0.35")

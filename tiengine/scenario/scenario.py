@@ -20,6 +20,7 @@ from tiengine.irregularity.irregularity import IrregularityParams
 from tiengine.irregularity.track_checks import check_wave
 from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
+from tiengine.parameters.html_rows import html_rows
 from tiengine.parameters.input_files import load_toml, to_tuples
 from tiengine.parameters.presets import find_preset
 from tiengine.parameters.quantity import Params, PlainName, Source, build
@@ -31,6 +32,7 @@ from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.shape_checks import check_shapes
 from tiengine.scenario.tables import BlowingWind, Contact, Numerics, Output, Track, Train
+from tiengine.track.baseplate import check_baseplate
 from tiengine.track.defects import check_defects
 from tiengine.track.knots import graded_knots
 from tiengine.track.seat_points import seat_points
@@ -70,6 +72,14 @@ class Scenario(Params):
     events: Events = Events()
     ensemble: Ensemble = Ensemble()
     presets: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
+
+    def _repr_html_(self) -> str:
+        """Table for notebooks: what the scenario states itself."""
+        rows = [("scenario", self.name)]
+        for key in ("train", "track", "irregularity", "contact", "numerics", "output", "ensemble"):
+            stated = getattr(self, key).model_dump(exclude_defaults=True)
+            rows += [(f"{key}.{name}", str(value)) for name, value in stated.items()]
+        return html_rows(rows)
 
     @cached_property
     def members(self) -> tuple[Scenario, ...]:
@@ -166,6 +176,7 @@ def _members(scenario: Scenario) -> tuple[Scenario, ...]:
         key = repr(ensemble.changes(i))
         if key not in made:
             made[key] = _changed(tables, ensemble, i)
+            _ = made[key].parts  # kept with the scenario and in its copies
         train = made[key]
         if "irregularity.seed" not in ensemble.vary:
             seeded = train.irregularity.model_copy(update={"seed": ensemble.seed(i, first)})
@@ -245,6 +256,7 @@ def _check(scenario: Scenario) -> None:
     step = scenario.numerics.time_step
     if step != "auto":
         check_wavelength(scenario, float(step))
+    check_baseplate(parts.slab, parts.fastening.baseplate)
     _check_alignment(scenario, begin)
     check_defects(
         scenario.track.failed_fastenings,

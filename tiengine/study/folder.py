@@ -256,10 +256,19 @@ class Folder:
             wall += record["wall"]
             recent += record["ended"] > began
         complete = self.complete()
-        parts = [name for name in os.listdir(self.path / "parts") if name.startswith(".") and name.endswith(".lock")]
+        running = sum(self._is_written(task, began) for task in self.left())
         size = sum(each.stat().st_size for kind in ("parts", "records") for each in os.scandir(self.path / kind))
         tasks = self.design.tasks
-        return Status(len(tasks), len(complete), len(parts), sum(map(len, tasks)), done, failed, wall, recent, size)
+        return Status(len(tasks), len(complete), running, sum(map(len, tasks)), done, failed, wall, recent, size)
+
+    def _is_written(self, task: int, since: float) -> bool:
+        """Whether an incomplete part was written since an instant [s]; a lock alone may be that of a killed process."""
+        path = self.part(task)
+        lock = path.with_name(f".{path.name}.lock")
+        try:
+            return lock.exists() and max(lock.stat().st_mtime, path.stat().st_mtime) > since
+        except OSError:  # just removed, or not begun
+            return False
 
     def log(self, words: str) -> None:
         """Add a line to the log of this process.

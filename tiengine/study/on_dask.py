@@ -150,7 +150,8 @@ class _Leader:
             if self.watch.stop() and not stopping:
                 stopping = True
                 self.folder.ask_to_stop()
-                self.client.cancel([each for each in futures.values() if not self._is_running(each)])
+                running = {key for keys in self.client.processing().values() for key in keys}
+                self.client.cancel([each for each in futures.values() if each.key not in running])
                 if not self.shared:
                     return
             try:
@@ -164,15 +165,6 @@ class _Leader:
                     self.watch.advanced(task, now, whole)
                 case int(task):
                     self._end(task, futures.pop(task))
-
-    def _is_running(self, future: Any) -> bool:
-        """Whether a worker has taken a task."""
-        return any(future.key in keys for keys in self._processing.values())
-
-    @property
-    def _processing(self) -> Mapping[str, Any]:
-        found: Mapping[str, Any] = self.client.processing()
-        return found
 
     def _end(self, task: int, future: Any) -> None:
         """Take the record of a task that has ended, or the reason why it has not."""

@@ -143,7 +143,7 @@ def _answer(folder: Folder, table: Table, name: str) -> _Answer:
         found.absent.append(str(error))
     found.draw(
         "Share of trains beyond a value, each train being a block; the line is the fitted law, the band its interval."
-        " Read no further than the band stays narrow.",
+        " Read no further than the band stays narrow. With factors the trains are those of all points together.",
         lambda: pictures.draw_exceedance(values, name, law, title),
     )
     found.swings = swings(table, name)

@@ -22,17 +22,19 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_convergence", "draw_exceedance", "draw_scatter", "draw_sobol", "draw_tornado", "words"]
 
+UNITS = {"_kN_m_m": "kN m/m", "_m_s_2": "m/s²", "_kN": "kN", "_ms": "ms", "_kPa": "kPa", "_mm": "mm", "_Hz": "Hz"}
+"""Units at the end of columns."""
+
 MOST_FACTORS = 12
 ACROSS = 3  # panels in a row
 
 
 def words(name: str) -> str:
     """Name of a column as words, its unit in brackets."""
-    head, _, unit = name.rpartition("_")
-    known = {"kN", "ms", "kPa", "mm", "m", "Hz"}
-    if unit in known:
-        return f"{head.replace('_', ' ')} [{unit}]"
-    return name.replace("_", " ").replace(" kN m m", " [kN m/m]").replace(" m s 2", " [m/s²]")
+    for ending, unit in UNITS.items():
+        if name.endswith(ending):
+            return f"{name.removesuffix(ending).replace('_', ' ')} [{unit}]"
+    return name.replace("_", " ")
 
 
 @in_style
@@ -51,7 +53,7 @@ def draw_exceedance(values: Reals, figure_name: str, law: ExtremeLaw | None, tit
     figure = new_figure(8.0, title)
     axes = figure.subplots()
     if law is not None:
-        counts = np.geomspace(1.05, max(20.0 * len(values), 1000.0), 60)
+        counts = np.geomspace(1.05, max(3.0 * len(values), 100.0), 60)
         levels = law.levels(list(counts))
         low, middle, high = np.array([(each.low, each.value, each.high) for each in levels]).T
         axes.fill_betweenx(1.0 / counts, low, high, color=SKY, alpha=0.4, linewidth=0.0, label="95 % interval")
@@ -77,9 +79,10 @@ def draw_scatter(table: Table, figure_name: str, title: str = "") -> Figure:
         title: Small text above the figure.
     """
     names = [name for name in table.factors if len(set(table[name].tolist())) > 1][:MOST_FACTORS]
-    rows = max(-(-len(names) // ACROSS), 1)
+    across = max(min(ACROSS, len(names)), 1)
+    rows = max(-(-len(names) // across), 1)
     figure = new_figure(5.5 * rows + 0.5, title)
-    panels = figure.subplots(rows, ACROSS, squeeze=False, sharey=True)
+    panels = figure.subplots(rows, across, squeeze=False, sharey=True)
     used = table.complete & np.isfinite(table[figure_name])
     for panel, name in zip(panels.flat, names, strict=False):
         _scatter(panel, table, name, figure_name, used)
@@ -129,6 +132,7 @@ def draw_tornado(found: Sequence[Swing], figure_name: str, mean: float, title: s
             axes.annotate(plain(label), (x, row), shift, textcoords="offset points", ha=side, va="center", fontsize=6.5)
     axes.axvline(mean, color=BLACK, linewidth=0.8)
     axes.set_yticks(range(len(shown)), [plain(swing.factor) for swing in reversed(shown)])
+    axes.use_sticky_edges = False  # room for the labels at either end
     axes.margins(x=0.25)
     axes.set_xlabel(plain(f"mean of {words(figure_name)}"))
     return figure

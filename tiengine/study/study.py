@@ -246,6 +246,24 @@ class Study:
 
         return sobol_indices(self.folder.design.plan, self.table(), figure, blocks)
 
+    def dataset(self, path: str | Path, **windows: Any) -> dict[str, int]:
+        """Cut the trains into windows for learning, split by seed, with a datasheet.
+
+        Args:
+            path: Folder to create, ending in ``.zarr`` or ``.parquet``.
+            windows: ``length``, ``step``, ``samples``, ``channels``, ``inputs``, ``labels``, ``by_time``, ``shares``,
+                ``seed``; see docs/studies.md.
+
+        Returns:
+            Number of windows in each split.
+
+        Raises:
+            InputError: A setting breaks a rule, or a channel is missing.
+        """
+        from tiengine.study.dataset import Windows, make_dataset
+
+        return make_dataset(self.folder, Path(path), Windows(**windows))
+
     def report(self, path: str | Path) -> None:
         """Write a page with all answers.
 
