@@ -7,8 +7,8 @@ value is mean + k standard deviations, k = 3.0 for running safety, 2.2 for the m
 quasi-static values (their mean); with fewer sections the largest of them, an index.
 
 Nadal's limit of Y/Q of a wheel that climbs, (tan d - mu)/(1 + mu tan d), with the flange angle d of the profile and the
-friction of the scenario. Wear number: T gamma = |Fx xi_x| + |Fy xi_y| + |Mz xi_s| [N], the energy lost per metre;
-British Rail's regimes of wear are mild below 100 N, severe to 200 N, catastrophic above.
+friction of the scenario. Wear number: T gamma = |Fx xi_x| + |Fy xi_y| [N], summed over a wheel's patches, the energy
+lost per metre without that of spin; British Rail's regimes are mild below 100 N, severe to 200 N, catastrophic above.
 """
 
 from __future__ import annotations

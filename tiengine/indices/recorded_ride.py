@@ -66,6 +66,7 @@ class RecordedRide(Ride):
         self._vehicle_read, self._forces_read = -1, list[Reals]()
         self._wheel = self._group(result[f"trains/{train:03d}"], "wheel", ("lateral_force", "vertical_force"))
         self._body = self._group(result[f"trains/{train:03d}"], "body", ("acceleration",))
+        self._patch = result[f"trains/{train:03d}"].get("patch")
         self.speed = scenario.train.speed.fastest
         self.line, self.friction = scenario.track.line, scenario.track.friction
         self.flange_angle = scenario.parts.wheel.flange_angle
@@ -95,22 +96,23 @@ class RecordedRide(Ride):
 
     def wear_number(self, wheelset: int) -> tuple[Reals, Reals] | None:
         """Return chainages [m] after the run-in and the wear number of both wheels [N], None without its channels."""
-        pairs = [
-            (f"{name}_creepage", force)
-            for name, force in (
-                ("longitudinal", "longitudinal_creep_force"),
-                ("lateral", "lateral_creep_force"),
-                ("spin", "spin_moment"),
-            )
-        ]  # fmt: skip
+        number = self._of_patches(wheelset) if self._patch is not None else self._of_wheels(wheelset)
+        if number is None:
+            return None
+        keep = self._from_same_chainage(self.wheel_times, self.vehicle_of(wheelset)).used()
+        return self.wheel_times.position[keep], number[keep]
+
+    def _of_patches(self, wheelset: int) -> Reals:
+        """Wear number of both wheels [N], shape (n, 2): the sum over their patches, which slip differently."""
+        return np.asarray(self._patch["wear_number"][:, wheelset].astype(np.float64).sum(axis=-1))
+
+    def _of_wheels(self, wheelset: int) -> Reals | None:
+        """Wear number of both wheels with one patch [N], shape (n, 2), None without its channels."""
+        pairs = [(f"{name}_creepage", f"{name}_creep_force") for name in ("longitudinal", "lateral")]
         if any(name not in self._wheel for pair in pairs for name in pair):
             return None
-        number = sum(
-            np.abs(self._wheel[slip][:, wheelset].astype(np.float64) * self._wheel[force][:, wheelset])
-            for slip, force in pairs
-        )
-        keep = self._from_same_chainage(self.wheel_times, self.vehicle_of(wheelset)).used()
-        return self.wheel_times.position[keep], np.asarray(number)[keep]
+        slip, force = (np.stack([self._wheel[pair[i]][:, wheelset] for pair in pairs]) for i in range(2))
+        return np.asarray(np.abs(slip.astype(np.float64) * force).sum(axis=0))
 
     def lag(self, vehicle: int) -> float:
         """Return the distance of a vehicle's leading wheelset behind that of the first one [m]."""
