@@ -183,10 +183,11 @@ def clear_loads(slab: Array, base: int, dofs: int):
 
 @ti.func
 def record_motion(slab: Array, base: int, dofs: int, out: int, record_out: Array):
-    """Copy a group's displacements and rates to ``record_out``, whose rows alternate, from row ``out`` on."""
+    """Copy a group's displacements, rates and accelerations to ``record_out``, in turn, from row ``out`` on."""
     for i in range(dofs):
         s = (base + i) * at.SLAB_ROWS
-        record_out[out + 2 * i], record_out[out + 2 * i + 1] = slab[s + at.U], slab[s + at.V]
+        for m in ti.static(range(3)):
+            record_out[out + 3 * i + m] = slab[s + at.U + m]
 
 
 @ti.func

@@ -273,7 +273,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
                             for g in range(groups):
                                 row = (b * body_record.shape[1] + record[step]) * groups + g
                                 slabs.record_motion(
-                                    slab, (b * groups + g) * (dofs + 2 * K) + K, dofs, row * 2 * dofs, slab_record
+                                    slab, (b * groups + g) * (dofs + 2 * K) + K, dofs, row * 3 * dofs, slab_record
                                 )
                     if ahead == 1:
                         for g in range(b0 * groups, (b0 + trains_a_chunk) * groups):

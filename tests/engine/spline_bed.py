@@ -264,7 +264,7 @@ def make_bed(
         irregularity[b] = 1e-4 * np.random.default_rng((7, b)).standard_normal((steps, W, at.N_IRREGULARITY))
     record = np.zeros((B, steps, W, 2, at.N_WHEEL_RECORD[given.contact.patches]))
     body_record = np.zeros((B, steps, 3, train.n_dof))
-    slab_record = aligned_zeros((B * steps * state.groups * state.slab_dofs * 2, 8))
+    slab_record = aligned_zeros((B * steps * state.groups * state.slab_dofs * 3, 8))
     slab_bed = SlabBed(
         model.bed_index, model.bed_shape, model.bed_weight, *(np.concatenate([f, f[:1]]) for f in (
             model.bed_factor, model.bed_rest, model.bed_lateral_K, model.bed_lateral_C)), model.bed_numbers,

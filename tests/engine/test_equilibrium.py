@@ -11,7 +11,7 @@ from tiengine.engine.state import DISPLACEMENT
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
 
-from ..models import Run, default_model
+from ..models import V350, Run, default_model
 
 KMH = 1.0 / 3.6
 
@@ -46,3 +46,12 @@ def test_what_cannot_roll_is_told():
     model = default_model()
     with pytest.raises(InputError, match=r"start = 'equilibrium': no steady rolling found at 350 km/h"):
         equilibrium(model, state_at_rest(model), 0.0, 350.0 * KMH, V_rate=1e9)
+
+
+def test_a_wheelset_on_stiffened_seats_finds_its_start():
+    """The leading wheelset stands where stiffened fastenings begin: it sinks less and carries its load."""
+    settings = ("track.failed_fastenings=[{seats = [50, 150], factor = 2.0}]", "numerics.window=44.0")
+    model = default_model(*settings)
+    state = state_at_rest(model)
+    equilibrium(model, state, 0.0, V350)
+    np.testing.assert_allclose(state.normal_force.sum(axis=2), 2.0 * model.constants[at.STATIC_LOAD], rtol=0.05)

@@ -51,6 +51,7 @@ SHORTER = {
         'method = "saltelli"\nsize = 16 ': 'method = "latin_hypercube"\nsize = 2 ',
         "-o matters": "-o matters --workers 1",
     },
+    "through_a_curve": {"distance = 330.0": "distance = 15.0\n[output]\nrun_in = 2.0\n"},
     "full_length": {"train.distance=15": "train.distance=4"},
 }
 """Replacements that shorten the runs, by tutorial; each text must be there."""
@@ -72,7 +73,7 @@ def follow(page: str, text: str) -> None:
     """Carry out everything on a page, one after the other, in the working folder."""
     names: dict[str, object] = {}
     for language, title, code in BLOCK.findall(text):
-        if language == "toml":
+        if language in ("toml", "csv"):
             Path(title).write_text(code, encoding="utf-8")
         elif language == "sh":
             for line in code.splitlines():

@@ -11,12 +11,12 @@ import pytest
 from numpy.typing import NDArray
 
 from tiengine.engine.kinds import make_stepper
-from tiengine.engine.state import DISPLACEMENT
+from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY
 from tiengine.kernels import layout as at
 from tiengine.recording.seat_envelopes import SeatEnvelopes, watched_seats
 from tiengine.recording.slab_envelopes import SlabEnvelopes
 from tiengine.scenario.scenario import load_scenario
-from tiengine.track.slab_moments import moment_operator
+from tiengine.track.slab_moments import moment_table
 
 from ..models import V350, Run, paper_model
 
@@ -82,11 +82,8 @@ def test_slabs_against_their_coordinates(mortar):
     scenario = load_scenario("paper")
     stepper, slab = run.stepper, run.model.ingredients.slab
     envelopes = SlabEnvelopes.of(scenario, stepper)
-    operator, slots, sound = (
-        moment_operator(slab),
-        run.model.ingredients.slots,
-        run.model.ingredients.designs.matrices[0],
-    )
+    slots, sound = run.model.ingredients.slots, run.model.ingredients.designs.matrices[0]
+    table, arm = moment_table(slab, run.model.ingredients.mortar), run.model.ingredients.rail.arm_fastening
     seen: dict[int, list[tuple[float, ...]]] = defaultdict(list)
     held: list[int] = []
 
@@ -94,7 +91,13 @@ def test_slabs_against_their_coordinates(mortar):
         held.append(run.state.first_slab)
         for number in range(held[-1], held[-1] + slots):
             u = run.state.slab_motion(DISPLACEMENT)[0, number % slots]
-            moments = np.tensordot(u, operator, 1)
+            v, a = (run.state.slab_motion(kind)[0, number % slots] for kind in (VELOCITY, ACCELERATION))
+            forces = np.zeros((4, slab.fastenings))
+            for k, (down, across, roll) in enumerate(np.moveaxis(run.state.seat_forces[0], 2, 0).transpose(0, 2, 1)):
+                on, seat = divmod(run.state.first_seat + k, slab.fastenings)
+                if on == number:
+                    forces[:2, seat], forces[2:, seat] = down, roll + arm * across
+            moments = (np.concatenate([forces.ravel(), a, v]) @ table.matrix).reshape(2, -1)
             under_seats = [
                 shape @ u[index]
                 for index, shape in zip(sound.seat_index.reshape(-1, 12), sound.seat_w.reshape(-1, 12), strict=True)
@@ -115,8 +118,9 @@ def test_slabs_against_their_coordinates(mortar):
         expected = [(max(row[i] for row in seen[k]), min(row[3 + i] for row in seen[k])) for k in sorted(seen)]
         scale = np.abs(expected).max()
         for extreme, values in zip(("largest", "smallest"), np.transpose(expected), strict=True):
-            # the same sums of 12 products in another order: rounding
-            np.testing.assert_allclose(found[f"{extreme}_{name}"], values, atol=1e-13 * scale)
+            # the same sums in another order: rounding; the seats' forces are those of the last pass, not yet converged
+            allowed = 1e-12 if name == "deflection" else 2e-3
+            np.testing.assert_allclose(found[f"{extreme}_{name}"], values, atol=allowed * scale)
     pressure = run.chunk.mortar[0]
     for i, number in enumerate(numbers):
         rows = [k for k, first in enumerate(held) if first <= number < first + slots]

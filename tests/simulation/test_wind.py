@@ -22,7 +22,8 @@ WIND = {"wind.speed": 12.0, "train.speed_kmh": 250.0, "train.distance": 15.0, "n
 def test_the_wheels_carry_the_winds_moment(functions):
     """Sum of Q_right - Q_left times their arms is the wind's moment and that of the displaced weights.
 
-    About the track's centre at the top of the rail. Within 1 %: lateral forces act some mm off the top of the rail.
+    About the track's centre at the top of the rail. Within 1 %: lateral forces act some mm off the top of the rail. The
+    leaning stiffness counts the weights alone, without the lift.
     """
     few = {"numerics.trial_functions": functions, "numerics.modes_per_metre": 2.0}
     scenario = load_scenario("smooth", QUIET | WIND | few)
@@ -37,7 +38,6 @@ def test_the_wheels_carry_the_winds_moment(functions):
     vehicle = scenario.parts.vehicles[0]
     arm = np.array([-1.0, 1.0]) * (vehicle.half_spacing + place) + y[3:, None]
     weights = GRAVITY * np.array([body.mass for body in vehicle.body])
-    weights[0] -= q * 10.0 * lift
     moment = (Q * arm).sum() - weights @ y
     assert moment == pytest.approx(q * 10.0 * 3.0 * roll, rel=0.01)
     assert Y.sum() == pytest.approx(q * 10.0 * side, rel=0.01)

@@ -7,17 +7,14 @@ a gap beyond reach.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 from scipy.ndimage import correlate1d, distance_transform_edt
 
 from tiengine.contact.branches import in_slots, split_stations
-from tiengine.contact.search import DEEPEST, transverse_curvature
+from tiengine.contact.search import DEEPEST, Contacts, SecondContacts
 from tiengine.parameters.arrays import Reals
-
-if TYPE_CHECKING:
-    from tiengine.contact.table import WheelRailPair
 
 __all__ = ["SMALLEST_SHARE", "raw_slots", "smoothed_slots"]
 
@@ -28,27 +25,20 @@ NEGLIGIBLE = 1e-5
 """Smoothed shares below this are those of an empty slot: the tail of the Gaussian five standard deviations away."""
 
 
-def raw_slots(pair: WheelRailPair, u: Reals, alpha: Reals, span: float) -> tuple[Reals, Reals, Reals]:
-    """Geometry and shares of both slots, and the gap of the lower minimum, not smoothed.
+def raw_slots(first: Contacts, second: SecondContacts, curvature: Callable[[Contacts], Reals]) -> tuple[Reals, Reals]:
+    """Geometry and shares of both slots, not smoothed.
 
     Args:
-        pair: Wheel and rail.
-        u: Outward shifts [m], shape (n,).
-        alpha: Outward tilts [rad], shape (n,).
-        span: Half width over which curvature is measured [m].
+        first: Lower minima of the gap, shape (n,).
+        second: Higher minima beside them.
+        curvature: Transverse curvature of the gap at contacts [1/m], shape (n,).
 
     Returns:
-        Gap, s_w, s_r, radius less r0, tan gamma, transverse curvature, shape (2, 6, n); shares, shape (2, n); gap,
-        shape (n,).
+        Gap, s_w, s_r, radius less r0, tan gamma, transverse curvature, shape (2, 6, n); shares, shape (2, n).
     """
-    first = pair.contacts(u, alpha)
-    second = pair.second_contacts(u, alpha, first)
     slots = in_slots(first, second, split_stations(first, second))
-    geometry = [
-        np.stack([*(getattr(c, name) for name in NAMES), transverse_curvature(pair.wheel, pair.canted_rail, c, span)])
-        for c in slots.contacts
-    ]
-    return np.stack(geometry), slots.share, first.gap
+    geometry = [np.stack([*(getattr(c, name) for name in NAMES), curvature(c)]) for c in slots.contacts]
+    return np.stack(geometry), slots.share
 
 
 def smoothed_slots(geometry: Reals, share: Reals, lowest: Reals, kernel: Reals) -> tuple[Reals, Reals, Reals]:

@@ -292,11 +292,16 @@ def _slots(pair: WheelRailPair, u: Reals, alpha: Reals) -> tuple[Reals, Reals, R
     """Geometry of both slots, as :func:`_smoothed_geometry` has it, their shares, and the gap of the lower minimum."""
     fine, finer, kernel = _fine_axis(pair.settings, u)
     shift, tilt = (grid.ravel() for grid in np.meshgrid(fine, alpha, indexing="ij"))
-    geometry, share, lowest = raw_slots(pair, shift, tilt, pair.settings.curvature_span)
+    first = pair.contacts(shift, tilt)
+    geometry, share = raw_slots(
+        first,
+        pair.second_contacts(shift, tilt, first),
+        lambda at: transverse_curvature(pair.wheel, pair.canted_rail, at, pair.settings.curvature_span),
+    )
     geometry[:, 5] = np.maximum(geometry[:, 5], SMALLEST_CURVATURE)
     grid = (fine.size, alpha.size)
     smooth, shares, gap = smoothed_slots(
-        geometry.reshape(2, 6, *grid), share.reshape(2, *grid), lowest.reshape(grid), kernel
+        geometry.reshape(2, 6, *grid), share.reshape(2, *grid), first.gap.reshape(grid), kernel
     )
     reach = len(kernel) // 2
     inside = slice(reach, fine.size - reach, finer)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from tiengine.engine.chunk import Chunk
 from tiengine.model.model import Model
 from tiengine.parameters.arrays import Ints
 
-__all__ = ["fill_pressures"]
+__all__ = ["designs_in_slots", "fill_pressures"]
 
 BLOCK = 256
 """Slabs of a product: its result stays in the cache while it is scaled and searched."""
@@ -24,7 +26,7 @@ def fill_pressures(model: Model, chunk: Chunk) -> None:
         chunk: ``slab`` and ``rear_slab`` are read, ``mortar`` is filled.
     """
     (k, c), rows = model.bed_numbers[:2], chunk.filled
-    kinds = _designs(model, chunk.rear_slab[:rows], chunk.mortar.shape[2]).ravel()
+    kinds = designs_in_slots(model.ingredients.designs.of_slab, chunk.rear_slab[:rows], chunk.mortar.shape[2]).ravel()
     factor, at_rest = (values.reshape(len(values), -1) for values in (model.bed_factor, model.bed_rest))
     for motion, out in zip(chunk.slab, chunk.mortar, strict=True):
         moved = k * motion[:rows, 0] + c * motion[:rows, 1]
@@ -39,10 +41,16 @@ def fill_pressures(model: Model, chunk: Chunk) -> None:
             pressure.min(axis=1, out=extremes[part][: len(kind), 1])
 
 
-def _designs(model: Model, rear_slab: Ints, slots: int) -> Ints:
-    """Design of the slab in each slot, shape (rows, slots), from the rear slab, shape (rows,)."""
+def designs_in_slots(of_slab: Mapping[int, int], rear_slab: Ints, slots: int) -> Ints:
+    """Design of the slab in each slot, shape (rows, slots).
+
+    Args:
+        of_slab: Design of the slabs (by index along the track) that are not sound.
+        rear_slab: Rear slab in memory, shape (rows,).
+        slots: Slabs in memory.
+    """
     slab = rear_slab[:, None] + (np.arange(slots) - rear_slab[:, None]) % slots
     designs = np.zeros_like(slab)
-    for number, design in model.ingredients.designs.of_slab.items():
+    for number, design in of_slab.items():
         designs[slab == number] = design
     return designs

@@ -22,7 +22,8 @@ class Chunk:
         irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
         wheel: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL_RECORD).
         body: Recorded displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
-        slab: Displacement and velocity of the slabs' coordinates, with the bodies, shape (B, rows, 2, slots, dofs).
+        slab: Displacement, velocity, acceleration of the slabs' coordinates, with the bodies, shape (B, rows, 3, slots,
+            dofs).
         rear_slab: Rear slab in memory then, shape (rows,); slab i is in slot i modulo their number.
         mortar: Largest and smallest pressure of each slab then [Pa], shape (B, rows, slots, 2).
         filled: Rows of the bodies' record that the last steps have filled.
@@ -47,7 +48,7 @@ class Chunk:
             irregularity=np.zeros((B, steps, W, ingredients.channels)),
             wheel=np.zeros((B, steps, W, 2, at.N_WHEEL_RECORD[ingredients.contact.patches])),
             body=np.zeros((B, rows, 3, 5 * bodies)),
-            slab=np.zeros((B, rows, 2, slots, ingredients.designs.matrices[0].n)),
+            slab=np.zeros((B, rows, 3, slots, ingredients.designs.matrices[0].n)),
             rear_slab=np.zeros(rows, dtype=np.int64),
             mortar=np.zeros((B, rows, slots, 2)),
         )

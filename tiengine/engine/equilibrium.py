@@ -228,7 +228,10 @@ class _Problem:
         return out
 
     def solve(self) -> NDArray[np.float64]:
-        """Newton's method, from high friction down to the scenario's where it fails at once; shape (n + 6 W,).
+        """Newton's method, from other guesses where it fails at once; shape (n + 6 W,).
+
+        Where the track is uneven, on stiffened or failed fastenings, every wheel sinks by its own: a mean leaves wheels
+        in the air.
 
         At low friction spin alone nearly saturates the creep forces: from the guess, which has none, Newton's method
         oversteps into sliding, where nothing tells the way back.
@@ -237,6 +240,9 @@ class _Problem:
         y, size = self._newton(self._guess())
         if size < FORCE_TOLERANCE:
             return y
+        apart, left = self._newton(self._guess(mean=False))
+        if left < FORCE_TOLERANCE:
+            return apart
         if self.model.ingredients.given and (found := self._approach()) is not None:
             return found
         reached, y = np.inf, self._guess()
@@ -301,8 +307,8 @@ class _Problem:
             y = trials[int(np.argmin(np.abs(self.residual(trials)).max(axis=1)))]
         return y, size
 
-    def _guess(self) -> NDArray[np.float64]:
-        """Vertical equilibrium on linearised contact springs, the track held."""
+    def _guess(self, mean: bool = True) -> NDArray[np.float64]:
+        """Vertical equilibrium on linearised contact springs, the track sunk by the mean of the wheels or by each."""
         train, dof = self.train, self.train.wheelset_dof
         load = float(self.model.constants[at.STATIC_LOAD])
         centre = self.model.ingredients.contact.lookup(np.array(0.0), np.array(0.0))
@@ -311,14 +317,17 @@ class _Problem:
         stiffness = 1.5 * load / approach
         K = train.K.copy()
         f = self.load.copy()
+        force = np.zeros((len(dof), 2, 3))
+        force[:, :, 0] = load
+        sinking = self.track.under_wheels(force[None])[0, :, :, 0]
+        common = sinking.mean(axis=1).mean()
+        own = np.zeros_like(sinking) if mean else sinking - common
         for w, b0 in enumerate(train.half_spacing):
             K[dof[w, 1], dof[w, 1]] += 2.0 * stiffness
             K[dof[w, 2], dof[w, 2]] += 2.0 * stiffness * b0**2
-            f[dof[w, 1]] += 2.0 * (stiffness * approach - load)
+            f[dof[w, 1]] += 2.0 * (stiffness * approach - load) + stiffness * own[w].sum()
+            f[dof[w, 2]] += stiffness * b0 * (own[w, 1] - own[w, 0])
         x = np.linalg.lstsq(K, f, rcond=1e-12)[0]
         x[self.pitch] = 0.0
-        force = np.zeros((len(dof), 2, 3))
-        force[:, :, 0] = load
-        sinking = self.track.under_wheels(force[None])[0, :, :, 0].mean(axis=1)
-        x[1 : train.n_dof : 5] += sinking.mean()
+        x[1 : train.n_dof : 5] += common
         return np.concatenate([x, force.ravel()])

@@ -203,7 +203,6 @@ class SineStepper(Stepper):
         chunk, state = self.chunk, self.state
         for kind in range(3):
             chunk.body[:, row, kind] = state.body_motion(kind)
-        for kind in range(2):
             chunk.slab[:, row, kind] = state.slab_motion(kind)
         chunk.rear_slab[row] = state.first_slab
         if self._explicit_bed:

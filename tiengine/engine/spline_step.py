@@ -136,8 +136,8 @@ class SplineStep:
             irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
             wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL_RECORD).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
-            slab_record: Displacement, then velocity of every slab coordinate where the bodies are recorded, vectors,
-                shape (B rows groups N 2, 8).
+            slab_record: Displacement, velocity, acceleration of every slab coordinate where the bodies are recorded,
+                vectors, shape (B rows groups N 3, 8).
             bed: Bed, read if MORTAR_MODE is not 0.
             loads: Loads of the cars.
         """

@@ -48,7 +48,7 @@ class SplineStepper(Stepper):
         """
         super().__init__(model.ingredients, state, chunk)
         self.model, train, tables = model, model.ingredients.train, state.tables
-        rows = chunk.body.shape[1] * state.held.groups * state.held.slab_dofs * 2
+        rows = chunk.body.shape[1] * state.held.groups * state.held.slab_dofs * 3
         self._slab_record = aligned_zeros((state.trains * rows, 8))
         cars = tables.cars
         width = 8 * cars.blocks * len(cars.car)
@@ -147,9 +147,9 @@ class SplineStepper(Stepper):
         """Put the record of the slabs into the chunk; pressures of a wholly implicit bed."""
         self.chunk.filled = body_rows
         held, slots = self.state.held, self.state.slots
-        shape = (held.trains, -1, held.groups, held.slab_dofs, 2, 8)
+        shape = (held.trains, -1, held.groups, held.slab_dofs, 3, 8)
         recorded = self._slab_record.reshape(shape)[:, :body_rows].transpose(0, 1, 4, 2, 5, 3)
-        by_slot = recorded.reshape(held.trains, body_rows, 2, 8 * held.groups, held.slab_dofs)
+        by_slot = recorded.reshape(held.trains, body_rows, 3, 8 * held.groups, held.slab_dofs)
         self.chunk.slab[:, :body_rows] = by_slot[..., :slots, :]
         if not self._explicit_bed:  # else they are known from the forces
             fill_pressures(self.model, self.chunk)

@@ -79,7 +79,7 @@ def _designs(scenario: Scenario) -> SlabDesigns:
     """Sound design of the slabs, and one for each slab with a void or a failed fastening."""
     parts, track = scenario.parts, scenario.track
     voids = track.mortar_voids
-    matrices, of_void = slab_designs(parts.slab, parts.mortar, voids)
+    matrices, of_void = slab_designs(parts.slab, parts.mortar, voids, parts.fastening.baseplate)
     per_slab = parts.slab.fastenings
     damaged = set(of_void)
     for row in track.failed_fastenings:

@@ -12,9 +12,9 @@ from tiengine.engine.stepper import Stepper
 from tiengine.model.implicit_seats import seat_shapes
 from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
+from tiengine.recording.slab_moments import SlabMoments
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
-from tiengine.track.slab_moments import moment_operator
 
 __all__ = ["SlabEnvelopes", "SlotExtremes"]
 
@@ -96,18 +96,20 @@ class SlabEnvelopes:
     Attributes:
         stepper: Is watched.
         void: Smallest factor of the voids under each slab that has one.
-        shape: Deflection at the nodes and under the seats, moments at the points of :mod:`tiengine.track.slab_moments`.
+        moments: Bending moments by the motion.
+        shape: Deflection at the nodes and under the seats, moments at the places of :mod:`tiengine.track.slab_moments`.
         pressure: Of the mortar.
     """
 
     stepper: Stepper
     void: Mapping[int, float]
+    moments: SlabMoments
     shape: SlotExtremes
     pressure: SlotExtremes
 
     def __post_init__(self) -> None:
         """Operator on the slabs' coordinates."""
-        self._operator, _ = _measures(self.stepper.ingredients)
+        self._places = _deflections(self.stepper.ingredients)
 
     @classmethod
     def of(cls, scenario: Scenario, stepper: Stepper) -> SlabEnvelopes:
@@ -115,10 +117,11 @@ class SlabEnvelopes:
         void: dict[int, float] = {}
         for each in scenario.track.mortar_voids:
             void[each.slab] = min(each.factor, void.get(each.slab, each.factor))
-        operator, starts = _measures(stepper.ingredients)
+        moments, nodes = SlabMoments(stepper.ingredients), _deflections(stepper.ingredients).shape[1]
         trains, slots = stepper.state.trains, stepper.state.slots
-        shape = SlotExtremes.of(trains, slots, operator.shape[1], starts)
-        return cls(stepper, void, shape, SlotExtremes.of(trains, slots, 1))
+        starts = (0, nodes, nodes + moments.points)
+        shape = SlotExtremes.of(trains, slots, nodes + 2 * moments.points, starts)
+        return cls(stepper, void, moments, shape, SlotExtremes.of(trains, slots, 1))
 
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
         """Take in the bodies' samples of the chunk; slabs that were left behind, train by train.
@@ -129,19 +132,18 @@ class SlabEnvelopes:
         rear = chunk.rear_slab[: chunk.filled]
         for slab in np.unique(rear):
             rows = slice(*np.searchsorted(rear, (slab, slab + 1)).tolist())  # the window never goes back
-            self._take_in(int(slab), chunk.slab[:, rows, 0], chunk.mortar[:, rows])
+            self._take_in(int(slab), chunk.slab[:, rows], chunk.mortar[:, rows])
         return self._taken()
 
     def _take_in(self, rear: int, moved: Reals, pressure: Reals) -> None:
-        """Take in samples with one rear slab: displacements (B, rows, slots, dofs), pressures (B, rows, slots, 2)."""
+        """Take in samples with one rear slab: motion (B, rows, 3, slots, dofs), pressures (B, rows, slots, 2)."""
         self.pressure.move(rear)
         self.pressure.add(pressure[..., :1].max(axis=1), pressure[..., 1:].min(axis=1))
         self.shape.move(rear)
-        trains, rows, slots, dofs = moved.shape
-        for b in range(trains):
-            for first in range(0, rows, ROWS):
-                part = moved[b, first : first + ROWS]
-                values = (part.reshape(-1, dofs) @ self._operator).reshape(len(part), slots, -1)
+        for b, motion in enumerate(moved):
+            for first in range(0, len(motion), ROWS):
+                part = motion[first : first + ROWS]
+                values = np.concatenate([part[:, 0] @ self._places, self.moments.of(rear, part)], axis=2)
                 self.shape.add(values.max(axis=0), values.min(axis=0), slice(b, b + 1))
 
     def remainder(self) -> list[Block]:
@@ -182,14 +184,12 @@ class SlabEnvelopes:
         ]
 
 
-def _measures(ingredients: Ingredients) -> tuple[Reals, tuple[int, int, int]]:
-    """Slab coordinates to deflection, M_x, M_y, shape (dofs, points), and the first point of each.
+def _deflections(ingredients: Ingredients) -> Reals:
+    """Slab coordinates to the deflection at the nodes and under the fastenings, shape (dofs, points).
 
-    The deflection is taken at the nodes and under the fastenings: of a coarse mesh no node may be near these.
+    Of a coarse mesh no node may be near the fastenings.
     """
     slab, seats = ingredients.slab, 2 * ingredients.slab.fastenings
-    moments = moment_operator(slab)
-    nodes = np.eye(len(moments))[:, : slab.plate_dofs : 3]
-    places = np.hstack([nodes, seat_shapes(ingredients.designs.matrices[0])[:, :seats]])
-    n, points = places.shape[1], moments.shape[2]
-    return np.hstack([places, moments[:, 0], moments[:, 1]]), (0, n, n + points)
+    shapes = seat_shapes(ingredients.designs.matrices[0])
+    nodes = np.eye(len(shapes))[:, : slab.plate_dofs : 3]
+    return np.hstack([nodes, shapes[:, :seats]])

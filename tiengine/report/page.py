@@ -28,6 +28,7 @@ from tiengine.report.scenario_words import scenario_words
 from tiengine.result_files.output_file import check_output
 from tiengine.result_files.reader import COMPLETE
 from tiengine.result_files.summary import summary
+from tiengine.track.baseplate import POINT
 
 if TYPE_CHECKING:
     from tiengine.result import Result
@@ -70,6 +71,7 @@ def render(result: Result, train: int | None = None) -> str:
     pictures, absent = _pictures(result, shown)
     content = {
         "title": result.scenario.name,
+        "seats_are_points": result.scenario.parts.fastening.baseplate == POINT,
         "file": Path(result.name).name,
         "version": tiengine.__version__,
         "trains": result.trains,

@@ -32,6 +32,7 @@ from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.shape_checks import check_shapes
 from tiengine.scenario.tables import BlowingWind, Contact, Numerics, Output, Track, Train
+from tiengine.track.baseplate import check_baseplate
 from tiengine.track.defects import check_defects
 from tiengine.track.knots import graded_knots
 from tiengine.track.seat_points import seat_points
@@ -255,6 +256,7 @@ def _check(scenario: Scenario) -> None:
     step = scenario.numerics.time_step
     if step != "auto":
         check_wavelength(scenario, float(step))
+    check_baseplate(parts.slab, parts.fastening.baseplate)
     _check_alignment(scenario, begin)
     check_defects(
         scenario.track.failed_fastenings,

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationInfo, field_validator
 
 from tiengine.parameters.quantity import Name, Params, Q, Source
 from tiengine.track.seat_points import mean_cosine
@@ -23,6 +24,26 @@ class Fastening(Params):
     vertical_damping: Annotated[float, Q("N s/m", "c_v", ge=0)]
     lateral_damping: Annotated[float, Q("N s/m", "c_l", ge=0)]
     length: Annotated[float, Q("m", "of rail on which the pad presses, evenly; 0 for a point", ge=0, le=0.4)] = 0.15
+    baseplate_length: Annotated[
+        float, Q("m", "along the track, of the slab on which the baseplate presses, evenly; 0 for a point", ge=0, le=1)
+    ] = 0.36
+    baseplate_width: Annotated[
+        float,
+        Q("m", "across the track, of the slab on which the baseplate presses", ge=0, le=1, validate_default=True),
+    ] = 0.18
+
+    @field_validator("baseplate_width")
+    @classmethod
+    def _is_a_rectangle_or_a_point(cls, value: float, info: ValidationInfo) -> float:
+        length = info.data.get("baseplate_length", value)
+        if (value == 0.0) != (length == 0.0):
+            raise ValueError(f"must be 0 if baseplate_length is, and only then; baseplate_length is {length:g} m")
+        return value
+
+    @property
+    def baseplate(self) -> tuple[float, float]:
+        """Length along and width across the track of the rectangle on which the seat presses on the slab [m]."""
+        return self.baseplate_length, self.baseplate_width
 
 
 def seat_count(length: float, spacing: float) -> int:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from tiengine.kernels import plate
 from tiengine.parameters.errors import InputError
+from tiengine.track.baseplate import POINT, seat_rows
 from tiengine.track.mortar import GAUSS, Mortar, MortarVoid, bed_factors
-from tiengine.track.plate_shapes import WY, W, element_dofs, shapes_at, tabulate_shapes
+from tiengine.track.plate_shapes import element_dofs, tabulate_shapes
 from tiengine.track.slab import Slab
 
 
@@ -27,10 +28,10 @@ class SlabMatrices:
         K_plate: Stiffness of the plate, shape (n, n); zero for lateral displacement and yaw.
         K_bed: Stiffness of the bed, lateral bed included, shape (n, n).
         C_bed: Damping of the bed, lateral bed included, shape (n, n).
-        seat_index: DOFs of the element at every seat, shape (fastenings, 2, 12).
-        seat_w: Shapes: w at a seat is seat_w . u[seat_index], shape (fastenings, 2, 12).
+        seat_index: DOFs that every seat touches, 12 if it lies within an element, shape (fastenings, 2, touched).
+        seat_w: Shapes: w at a seat is seat_w . u[seat_index], shape (fastenings, 2, touched).
         seat_slope: dw/dy at a seat is seat_slope . u[seat_index] [1/m for the w DOFs], shape (fastenings, 2,
-            12).
+            touched).
         seat_x: Seats from the slab's centre [m], shape (fastenings,); lateral motion there is y + psi seat_x.
         bed_index: DOFs of every element, shape (n_el, 12).
         bed_shape: Shapes at the quadrature points of an element, shape (n_q, 12).
@@ -55,13 +56,16 @@ class SlabMatrices:
     bed_weight_pressure: NDArray[np.float64]
 
 
-def slab_matrices(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid] = ()) -> SlabMatrices:
+def slab_matrices(
+    slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid] = (), baseplate: tuple[float, float] = POINT
+) -> SlabMatrices:
     """Compute the matrices of one slab.
 
     Args:
         slab: The slab.
         mortar: Its bed.
         voids: Voids of this slab, all of the same slab index.
+        baseplate: Rectangle on which a seat presses, along and across [m].
 
     Returns:
         The matrices and tables.
@@ -72,16 +76,19 @@ def slab_matrices(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid] = ()) 
     """
     if len({void.slab for void in voids}) > 1:
         raise InputError(f"mortar void on slab {voids[-1].slab}: every void must be on slab {voids[0].slab}")
-    return _build(slab, mortar, [list(voids)])[0]
+    return _build(slab, mortar, [list(voids)], baseplate)[0]
 
 
-def slab_designs(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid]) -> tuple[list[SlabMatrices], dict[int, int]]:
+def slab_designs(
+    slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid], baseplate: tuple[float, float] = POINT
+) -> tuple[list[SlabMatrices], dict[int, int]]:
     """Compute the matrices of the intact slab and of every slab with voids.
 
     Args:
         slab: The slab.
         mortar: Its bed.
         voids: Voids of the whole track.
+        baseplate: Rectangle on which a seat presses, along and across [m].
 
     Returns:
         The designs, the intact one first, and the design of each slab index that has voids.
@@ -92,10 +99,12 @@ def slab_designs(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid]) -> tup
     damaged = sorted({void.slab for void in voids})
     groups: list[list[MortarVoid]] = [[]]
     groups += [[void for void in voids if void.slab == index] for index in damaged]
-    return _build(slab, mortar, groups), {index: 1 + i for i, index in enumerate(damaged)}
+    return _build(slab, mortar, groups, baseplate), {index: 1 + i for i, index in enumerate(damaged)}
 
 
-def _build(slab: Slab, mortar: Mortar, groups: list[list[MortarVoid]]) -> list[SlabMatrices]:
+def _build(
+    slab: Slab, mortar: Mortar, groups: list[list[MortarVoid]], baseplate: tuple[float, float]
+) -> list[SlabMatrices]:
     """Build one design for each group of voids."""
     elements = (slab.elements_x, slab.elements_y)
     points, weight = _quadrature(slab)
@@ -103,7 +112,7 @@ def _build(slab: Slab, mortar: Mortar, groups: list[list[MortarVoid]]) -> list[S
     factor = np.stack([bed_factors(slab.length, slab.width, elements, voids) for voids in groups])
     index = element_dofs(slab)
     stiffness, mass, bed = _assemble(slab, table, weight, factor)
-    seat_index, seat_w, seat_slope, seat_x = _seats(slab)
+    seat_index, seat_w, seat_slope, seat_x = _seats(slab, baseplate)
     designs = []
     for d in range(len(groups)):
         area = bed[d].copy()
@@ -174,15 +183,15 @@ def _lateral_bed(
 
 
 def _seats(
-    slab: Slab,
+    slab: Slab, baseplate: tuple[float, float]
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """DOFs, w row, dw/dy row and x of every seat; seat j lies (j + 1/2) d beyond the centre of the joint."""
+    """DOFs, shapes of w and dw/dy, and x of every seat; seat j lies (j + 1/2) d beyond the centre of the joint."""
     seat_x = np.arange(0.5, slab.fastenings, dtype=np.float64) * slab.fastening_pitch - slab.pitch / 2.0
     seat_y = slab.seat_half_spacing * np.array([-1.0, 1.0])
     x, y = np.meshgrid(seat_x, seat_y, indexing="ij")
-    index, table = shapes_at(slab, x.ravel(), y.ravel())
-    shape = (slab.fastenings, 2, 12)
-    return index.reshape(shape), table[:, W].reshape(shape), table[:, WY].reshape(shape), seat_x
+    index, w, slope = seat_rows(slab, x.ravel(), y.ravel(), baseplate)
+    shape = (slab.fastenings, 2, -1)
+    return index.reshape(shape), w.reshape(shape), slope.reshape(shape), seat_x
 
 
 def _weight_pressure(

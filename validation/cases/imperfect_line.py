@@ -124,7 +124,6 @@ def _wind() -> Reals:
         np.array([-1.0, 1.0]) * (vehicle.half_spacing + place) + y[3:, None]
     )  # of either wheel, from the track's centre
     weight = GRAVITY * np.array([body.mass for body in vehicle.body])
-    weight[0] -= q * lift
     moment = (Q * arm).sum() - weight @ y
     return np.array([moment / (3.0 * q * roll), Y.sum() / (q * side), (GRAVITY * vehicle.mass - Q.sum()) / (q * lift)])
 
@@ -196,12 +195,12 @@ CASES = (
     ),
     Case(
         name="line-joint-P2",
-        kind="information",
+        kind="verification",
         quantity="largest force over a joint of two ramps of 5 mm/m at 100 km/h [kN]",
-        source="Jenkins et al. 1974, P2 with the track's own k_t, m_r and damping of the fastenings",
+        source="Jenkins et al. 1974, P2 = 132 kN with the track's own k_t, m_r and damping of the fastenings",
         reference=_jenkins,
-        why="the formula has one degree of freedom and no contact spring; data of the public case of 130.3 kN are not"
-        " at hand",
+        rtol=0.08,
+        why="the formula has one degree of freedom and no contact spring; it is a design rule, good to some per cent",
         compute=lambda: _peak(100.0, "joint", DIP),
         quick=False,
     ),

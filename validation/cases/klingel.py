@@ -35,7 +35,7 @@ from tiengine.simulation.simulate import run
 from validation.closed_forms.klingel import free_wheelset, rigid_bogie, track_conicity
 from validation.frame.case import Case
 
-__all__ = ["CASES", "cone", "fit_wave", "round_head", "write_kick"]
+__all__ = ["CASES", "cone", "fit_wave", "round_head", "wagon", "write_kick"]
 
 KMH, HALF_WHEELBASE, AXLE, HEAD_RADIUS, CORNER = 30.0, 1.25, 0.43, 0.3, 0.013
 FREE, SQUARE = 1.0, 1e9  # N/m
@@ -67,7 +67,7 @@ def cone(slope: float) -> dict[str, Any]:
     return {"name": "cone", "points": _text(y, -slope * y)}
 
 
-def _wagon(guidance: float) -> dict[str, Any]:
+def wagon(guidance: float) -> dict[str, Any]:
     """A car on two wheelsets; the guidance [N/m] is that of an axle box, longitudinally and laterally."""
     axles = ((f"wheelset {i + 1}", sign * HALF_WHEELBASE) for i, sign in enumerate((1.0, -1.0)))
     body = [{"name": "car", "mass": 20e3, "Jx": 2e4, "Jy": 2e4, "Jz": 2e4, "height": AXLE}]
@@ -87,7 +87,7 @@ def _scenario(slope: float, guidance: float, distance: float, kick: Path | None)
         {
             "name": "klingel",
             "train": {
-                "vehicles": (_wagon(guidance),),
+                "vehicles": (wagon(guidance),),
                 "wheel_profile": cone(slope),
                 "speed_kmh": KMH,
                 "distance": distance,

@@ -239,12 +239,16 @@ def _slab_groups(
     slabs = scale.shape[1]
     voids = {i: [v for v in scenario.track.mortar_voids if v.slab == first_slab + i] for i in range(slabs)}
     odd = [i for i in range(slabs) if voids[i] or (scale[:, i] != 1.0).any()]
-    sound = modal_slab(given.slab, given.mortar, [], slab_modes)
+    sound = modal_slab(given.slab, given.mortar, [], slab_modes, given.fastening.baseplate)
     even = np.setdiff1d(np.arange(slabs), odd)
     one = np.ones((2, given.slab.fastenings))
     groups = [SlabGroup(sound, even, _slab_inverse(given, sound, one))]
     for i in odd:
-        slab = sound if not voids[i] else modal_slab(given.slab, given.mortar, voids[i], slab_modes)
+        slab = (
+            sound
+            if not voids[i]
+            else modal_slab(given.slab, given.mortar, voids[i], slab_modes, given.fastening.baseplate)
+        )
         groups.append(SlabGroup(slab, np.array([i]), _slab_inverse(given, slab, scale[:, i])))
     return tuple(groups)
 

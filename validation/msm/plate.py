@@ -75,7 +75,9 @@ class _Mesh:
         return 3 * (self.nx + 1) * (self.ny + 1)
 
 
-def modal_slab(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid], modes: int) -> ModalSlab:
+def modal_slab(
+    slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid], modes: int, baseplate: tuple[float, float]
+) -> ModalSlab:
     """Reduce a slab to its lowest free-free modes.
 
     Args:
@@ -83,6 +85,7 @@ def modal_slab(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid], modes: i
         mortar: Its bed.
         voids: Voids of this slab.
         modes: Number of plate modes kept, including rigid ones; all of the mesh if it has fewer.
+        baseplate: Length along and width across the track on which a seat presses [m]; both 0 for points.
     """
     mesh = _Mesh(
         slab.elements_x,
@@ -96,7 +99,7 @@ def modal_slab(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid], modes: i
     omega2[:3] = 0.0  # rigid motions, up to rounding
     x = (np.arange(0.0, slab.fastenings) + 0.5) * slab.fastening_pitch - slab.pitch / 2.0
     y = slab.seat_half_spacing
-    at_seats = np.stack([_values(mesh, slab, x, side * y) for side in (-1.0, 1.0)], axis=1)  # (2, side, seats, n)
+    at_seats = np.stack([_at_seats(mesh, slab, x, side * y, baseplate) for side in (-1.0, 1.0)], axis=1)
     lateral = _lateral_bed(slab, voids)
     modal_bed = phi.T @ bed @ phi
     yaw = slab.mass * (slab.length**2 + slab.width**2) / 12.0
@@ -108,7 +111,7 @@ def modal_slab(slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid], modes: i
             np.diag(omega2) + mortar.stiffness * modal_bed, mortar.lateral_stiffness * lateral
         ),
         damping=scipy.linalg.block_diag(mortar.damping * modal_bed, mortar.lateral_damping * lateral),
-        seat=np.einsum("qsjn,nm->qsmj", at_seats, phi),
+        seat=np.einsum("qsjn,nm->qsmj", at_seats, phi),  # quantity, side, seat, DOF
         seat_x=x,
         bed=(sampled @ phi).T,
         bed_factor=np.array([_factor(slab, voids, px, py) for px, py in points]),
@@ -193,6 +196,29 @@ def _values(mesh: _Mesh, slab: Slab, x: Reals, y: float) -> Reals:
         local_y = y + slab.width / 2.0 - (2 * ey + 1) * mesh.b
         shapes = _shapes(mesh, np.array([local_x]), np.array([local_y]))
         rows[:, i, mesh.dofs(ex, ey)] = shapes[[0, 2], 0]
+    return rows
+
+
+def _at_seats(mesh: _Mesh, slab: Slab, x: Reals, y: float, baseplate: tuple[float, float]) -> Reals:
+    """Matrices from the slab's DOFs to w and w_y of seats at x and y, means over their baseplates, (2, seats, n).
+
+    The mean of w_y weighs w by 12 (eta - y) / width^2, as a linear pressure across presses.
+    """
+    length, width = baseplate
+    if length == width == 0.0:
+        return _values(mesh, slab, x, y)
+    rows = np.zeros((2, len(x), mesh.size))
+    for i, place in enumerate(x):
+        for ex in range(mesh.nx):
+            for ey in range(mesh.ny):
+                cx, cy = (2 * ex + 1) * mesh.a - slab.length / 2.0, (2 * ey + 1) * mesh.b - slab.width / 2.0
+                left, right = max(place - length / 2.0 - cx, -mesh.a), min(place + length / 2.0 - cx, mesh.a)
+                low, high = max(y - width / 2.0 - cy, -mesh.b), min(y + width / 2.0 - cy, mesh.b)
+                if right > left and high > low:
+                    px, py, weight = _box(left, right, low, high)
+                    share = weight[:, None] / (length * width) * _shapes(mesh, px, py)[0]
+                    rows[0, i, mesh.dofs(ex, ey)] += share.sum(axis=0)
+                    rows[1, i, mesh.dofs(ex, ey)] += 12.0 / width**2 * ((cy + py - y) @ share)
     return rows
 
 

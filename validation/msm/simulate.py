@@ -69,7 +69,7 @@ def run_full_length(
         The result, open for reading; the run ends before a wheel comes within 10 m of the rail's end.
 
     Raises:
-        InputError: The scenario has a varying speed, a start from zero or mortar without tension.
+        InputError: The scenario has a varying speed, a start from zero, an alignment or mortar without tension.
     """
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     numerics = numerics or FullLength()
@@ -92,6 +92,10 @@ def prepare(scenario: Scenario, numerics: FullLength, steps: int, body_rows: int
             raise InputError(f"{key}: must be left out in the full-length model")
     if scenario.numerics.start != "equilibrium":
         raise InputError('numerics.start = "zero": must be "equilibrium" in the full-length model')
+    if scenario.track.line is not None:
+        raise InputError(
+            "track.alignment: must be left out in the full-length model, whose track is straight and level"
+        )
     backend.start(1)
     V = scenario.train.speed.fastest
     given = ingredients(scenario, numerics.time_step)
