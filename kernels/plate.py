@@ -85,6 +85,7 @@ def tabulate_shapes(
         points: Local coordinates (xi, eta), shape (n, 2).
         table_out: w, dw/dx, dw/dy, d2w/dx2, d2w/dy2, d2w/dxdy of each shape, shape (n, 6, 12).
     """
+    ti.loop_config(serialize=True)  # set-up of a few elements is not worth a thread pool
     for q, i in ti.ndrange(points.shape[0], 12):
         P = acm_shape(i, points[q, 0], points[q, 1], a, b)
         for m in ti.static(range(6)):
@@ -118,6 +119,7 @@ def element_matrices(
         mass_out: Shape (n_design, n_el, 12, 12) [kg, kg m, kg m^2].
         bed_out: Shape (n_design, n_el, 12, 12) [m^2, m^3, m^4].
     """
+    ti.loop_config(serialize=True)  # set-up of a few elements is not worth a thread pool
     for d, e, i in ti.ndrange(factor.shape[0], factor.shape[1], 12):
         for j in range(i + 1):
             K = 0.0
@@ -161,6 +163,7 @@ def assemble_plates(
         element: Element matrices, shape (n_design, n_x n_y, 12, 12).
         matrix_out: Assembled matrices, shape (n_design, n, n) with n >= 3 (n_x + 1)(n_y + 1), added to.
     """
+    ti.loop_config(serialize=True)  # set-up of a few elements is not worth a thread pool
     for d, node in ti.ndrange(element.shape[0], (n_x + 1) * (n_y + 1)):
         ix = node // (n_y + 1)
         iy = node % (n_y + 1)

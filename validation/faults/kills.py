@@ -17,7 +17,7 @@ from tiengine import result as results
 from tiengine.parameters.errors import InputError
 from tiengine.result_files.journal import journal_of
 from validation.faults.contents import Contents, contents, differing, holds, litter, reads, start_of
-from validation.faults.launch import Process, command, copied, keep_shapes
+from validation.faults.launch import Process, command, copied
 from validation.faults.plan import Kill, Run
 from validation.faults.record import Record, read
 
@@ -90,7 +90,6 @@ class Yard:
         from tiengine.scenario.scenario import load_scenario
         from tiengine.simulation import simulate
 
-        keep_shapes()
         words = self.run.arguments
         settings = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
         path = self.folder / "reference.h5"

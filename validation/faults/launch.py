@@ -22,7 +22,7 @@ from typing import Any
 
 import psutil
 
-__all__ = ["Process", "command", "copied", "keep_shapes"]
+__all__ = ["Process", "command", "copied"]
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -127,23 +127,6 @@ def copied(folder: Path, name: str, words: Sequence[str], event: int = 0) -> Pro
         finally:
             os._exit(status)
     return Process(pid, log, said)
-
-
-def keep_shapes() -> None:
-    """Compute the shape functions of plates once and keep them for copies."""
-    from tiengine.kernels import plate
-
-    compute: Callable[..., Any] = plate.tabulate_shapes
-    kept: dict[tuple[float, float, bytes], Any] = {}
-
-    def tabulate(half_length: float, half_width: float, points: Any, table: Any) -> None:
-        key = half_length, half_width, points.tobytes()
-        if key not in kept:
-            compute(half_length, half_width, points, table)
-            kept[key] = table.copy()
-        table[:] = kept[key]
-
-    plate.tabulate_shapes = tabulate
 
 
 def _as_command(folder: Path, log: Path, said: Path, words: Sequence[str], event: int) -> int:
