@@ -12,7 +12,7 @@ FILES = sorted([*(ROOT / "tiengine").rglob("*.py"), *(ROOT / "kernels").glob("*.
 MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml", "runpy", "code", "codeop"}
 CALLS = {"eval", "exec", "compile", "__import__", "literal_eval", "execfile"}
 LOADERS = {"load", "read_array", "genfromtxt", "loadtxt", "fromfile", "read_pickle", "memmap"}
-STARTERS = {"subprocess": {"machine.py"}, "import_module": {"__init__.py", "catalogue.py"}}
+STARTERS = {"subprocess": {"machine.py"}, "import_module": {"__init__.py", "catalogue.py", "result.py"}}
 """Calls that start other code, and the modules that may use them, with constant arguments."""
 PICKLES = {"track_function.py"}
 """Modules that may pickle: a function that the caller of ``run`` passed in, for the caller's own worker processes."""

@@ -210,9 +210,11 @@ def test_defects_of_one_train():
 
 def test_parallel_loop_over_trains_agrees():
     """Other machine code, whose sums are associated otherwise (test_determinism)."""
+    sines = {"numerics.trial_functions": "sines"}
+    two = load_scenario("default", SHORT | sines | {"ensemble.size": 2})
     with (
-        simulate.run(ensemble(size=2)) as serial,
-        simulate.run(load_scenario(ensemble(size=2), {"numerics.threads": 2}), workers=1) as parallel,
+        simulate.run(two, workers=1) as serial,
+        simulate.run(load_scenario(two, {"numerics.threads": 2}), workers=1) as parallel,
     ):
         a, b = serial.wheel(1)["vertical_force"], parallel.wheel(1)["vertical_force"]
         np.testing.assert_allclose(a, b, atol=ROUNDING)
