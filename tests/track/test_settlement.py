@@ -9,7 +9,8 @@ from tiengine.engine import backend
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation.simulate import run
-from tiengine.track.settlement import Settlement, ground_shape, settled_rail
+from tiengine.track.settled_rail import settled_rail
+from tiengine.track.settlement import Settlement, ground_shape
 from tiengine.track.slab_matrices import slab_matrices
 
 AT, LENGTH, DEPTH = 100.0, 20.0, 0.01

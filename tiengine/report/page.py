@@ -28,7 +28,7 @@ from tiengine.report.scenario_words import scenario_words
 from tiengine.result_files.output_file import check_output
 from tiengine.result_files.reader import COMPLETE
 from tiengine.result_files.summary import summary
-from tiengine.track.baseplate import POINT
+from tiengine.track.fastening import POINT
 
 if TYPE_CHECKING:
     from tiengine.result import Result

@@ -32,8 +32,8 @@ from tiengine.scenario.overrides import Overrides, apply_overrides
 from tiengine.scenario.parts import Parts, build_parts, collect_presets
 from tiengine.scenario.shape_checks import check_shapes
 from tiengine.scenario.tables import BlowingWind, Contact, Numerics, Output, Track, Train
-from tiengine.track.baseplate import check_baseplate
 from tiengine.track.defects import check_defects
+from tiengine.track.fastening import check_baseplate
 from tiengine.track.knots import graded_knots
 from tiengine.track.seat_points import seat_points
 from tiengine.track.sines import Sines

@@ -32,7 +32,7 @@ from tiengine.result_files.layout import Block, TrainLabels
 from tiengine.scenario.scenario import Scenario
 from tiengine.simulation.messages import Advanced
 from tiengine.simulation.tasks import Task
-from tiengine.track.settlement import settled_rail
+from tiengine.track.settled_rail import settled_rail
 
 __all__ = ["CHUNK_STEPS", "LoopTimer", "Run"]
 

@@ -13,34 +13,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tiengine.parameters.errors import InputError
 from tiengine.track.plate_shapes import WY, W, shapes_at
 from tiengine.track.slab import Slab
 
-__all__ = ["POINT", "check_baseplate", "seat_rows"]
+__all__ = ["seat_rows"]
 
-POINT = (0.0, 0.0)
-"""Rectangle of a seat that is a point."""
 GAUSS = 4  # points per direction and element: shapes are cubic, times y makes degree 4, and four points integrate 7
-
-
-def check_baseplate(slab: Slab, rectangle: tuple[float, float]) -> None:
-    """Refuse a baseplate that reaches beyond the slab.
-
-    Args:
-        slab: The slab with its seats.
-        rectangle: Length along and width across the track [m].
-
-    Raises:
-        InputError: Names the key, its value and the largest one.
-    """
-    room = (slab.fastening_pitch - slab.gap, slab.width - 2.0 * slab.seat_half_spacing)
-    for key, value, most in zip(("length", "width"), rectangle, room, strict=True):
-        if value > most + 1e-9:
-            raise InputError(
-                f"track.fastening.baseplate_{key} = {value:g}: must be at most {most:g} m, so that the outer seats'"
-                " baseplates lie on the slab"
-            )
 
 
 def seat_rows(

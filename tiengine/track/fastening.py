@@ -8,10 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationInfo, field_validator
 
+from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Name, Params, Q, Source
 from tiengine.track.seat_points import mean_cosine
+from tiengine.track.slab import Slab
 
-__all__ = ["Fastening", "seat_count", "seat_tables"]
+__all__ = ["POINT", "Fastening", "check_baseplate", "seat_count", "seat_tables"]
+
+POINT = (0.0, 0.0)
+"""Rectangle of a seat that is a point."""
 
 
 class Fastening(Params):
@@ -69,3 +74,22 @@ def seat_tables(modes: int, length: float, spacing: float, seat_length: float = 
     mean = np.tile(mean_cosine(k, seat_length), 2)[:, None]
     table: NDArray[np.float64] = np.vstack([np.cos(phase), np.sin(phase)]) * mean
     return table
+
+
+def check_baseplate(slab: Slab, rectangle: tuple[float, float]) -> None:
+    """Refuse a baseplate that reaches beyond the slab.
+
+    Args:
+        slab: The slab with its seats.
+        rectangle: Length along and width across the track [m].
+
+    Raises:
+        InputError: Names the key, its value and the largest one.
+    """
+    room = (slab.fastening_pitch - slab.gap, slab.width - 2.0 * slab.seat_half_spacing)
+    for key, value, most in zip(("length", "width"), rectangle, room, strict=True):
+        if value > most + 1e-9:
+            raise InputError(
+                f"track.fastening.baseplate_{key} = {value:g}: must be at most {most:g} m, so that the outer seats'"
+                " baseplates lie on the slab"
+            )

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from tiengine.kernels import plate
 from tiengine.parameters.errors import InputError
-from tiengine.track.baseplate import POINT, seat_rows
+from tiengine.track.baseplate import seat_rows
+from tiengine.track.fastening import POINT
 from tiengine.track.mortar import GAUSS, Mortar, MortarVoid, bed_factors
 from tiengine.track.plate_shapes import element_dofs, tabulate_shapes
 from tiengine.track.slab import Slab

@@ -34,7 +34,8 @@ from scipy.sparse.linalg import splu
 
 from tiengine.kernels import plate
 from tiengine.parameters.arrays import Reals
-from tiengine.track.baseplate import POINT, seat_rows
+from tiengine.track.baseplate import seat_rows
+from tiengine.track.fastening import POINT
 from tiengine.track.mortar import GAUSS, Mortar
 from tiengine.track.plate_shapes import WX, WXX, WY, WYY, W, element_dofs, locate, shapes_at, tabulate_shapes
 from tiengine.track.slab import Slab
