@@ -46,7 +46,7 @@ VISIBLE = 1e-4  # m: below this a motion counts as decayed
 BUMP, BUMP_START, BUMP_LENGTH = 6e-3, 30.0, 20.0  # m: the flange clearance high, a hunting wave long
 COARSE = (
     "numerics.window=26.0",
-    "numerics.time_step=4e-4",
+    "numerics.time_step=2e-4",
     "output.body_interval=0.004",
 )
 WEAK = {  # the yaw dampers keep 1 N s/m

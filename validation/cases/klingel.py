@@ -94,7 +94,7 @@ def _scenario(slope: float, guidance: float, distance: float, kick: Path | None)
             },
             "track": {"rail_profile": round_head(), "friction": 1.0},
             "irregularity": {"file": str(kick), "taper": 1.0} if kick else {"spectrum": "none"},
-            "numerics": {"time_step": 1e-3},
+            "numerics": {"time_step": 1e-3, "passes": 4},
             "output": {"precision": "double", "body_interval": 1e-2},
         }
     )
