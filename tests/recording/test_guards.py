@@ -7,7 +7,7 @@ import pytest
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.kinds import make_stepper, state_at_rest
-from tiengine.engine.state import PARTS, VELOCITY
+from tiengine.engine.state import DISPLACEMENT, PARTS, VELOCITY
 from tiengine.engine.stepper import Rows
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
@@ -58,6 +58,16 @@ def test_it_checks_every_millisecond_and_after_the_last_step(guard: Guard, monke
         guard.stepper.rows = Rows(i)
         guard.watch_step()
     assert checked == [(1005, 4.0), (1010, 9.0), (1012, 11.0)]
+
+
+def test_wheelsets_that_have_turned_far_have_not_run_away(guard: Guard):
+    """After 100 km a wheelset has turned by 50 rad against its mean spin: nothing is wrong."""
+    values = guard.state.part(0, "vehicles")[DISPLACEMENT]
+    pitch = guard.stepper.ingredients.train.wheelset_dof[:, 3]
+    values[pitch] = 50.0
+    guard.state.put(DISPLACEMENT, "vehicles", values[None])
+    guard.check(10, 42.0)
+    assert guard.take() == {}
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e30], ids=["nan", "infinite", "huge"])

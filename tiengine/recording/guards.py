@@ -29,9 +29,10 @@ __all__ = ["Guard", "Watch"]
 EVERY = 1e-3
 """Simulated time between two checks [s]."""
 
-LIMITS = (10.0, 1e3, 1e7)
+LIMITS = (1e4, 1e3, 1e7)
 """Largest coordinate [m, rad], rate and acceleration of a sound run: a wheel flat accelerates a slab by about
-1e3 m/s^2, and no body moves by metres."""
+1e3 m/s^2. Coordinates grow to large values in sound runs too: a wheelset whose wheels do not roll on r0 turns against
+V/r0 by some hundredths of a radian a second, 10 rad in 20 km."""
 
 STEEPEST = 0.98
 """A flange climbs where its slope falls below this part of the steepest; the straight flank varies by 1 %."""
