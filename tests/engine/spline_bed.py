@@ -21,8 +21,9 @@ from tiengine.engine.vector_mode import lanes_for
 from tiengine.kernels import layout as at
 from tiengine.kernels import spline_layout as sl
 from tiengine.kernels.wheel_rail import COS, N_CONTACT
-from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes
+from tiengine.model.implicit_seats import seat_inverse_terms
 from tiengine.model.sine_model import SineModel as Model
+from tiengine.track.slab_matrices import seat_shapes
 from tiengine.vehicle.train import TrainModel
 
 Floats = NDArray[np.float64]

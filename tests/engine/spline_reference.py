@@ -11,7 +11,7 @@ from scipy.interpolate import BSpline
 from tiengine.kernels import layout as at
 from tiengine.kernels import spline_layout as sl
 from tiengine.kernels.spline_seats import FACTOR
-from tiengine.model.implicit_seats import seat_shapes
+from tiengine.track.slab_matrices import seat_shapes
 
 from .spline_bed import Bed
 

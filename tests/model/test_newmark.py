@@ -11,10 +11,11 @@ from tiengine.engine.chunk import Chunk
 from tiengine.engine.sine_state import SineState
 from tiengine.engine.sine_stepper import SineStepper
 from tiengine.kernels import layout as at
-from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes
+from tiengine.model.implicit_seats import seat_inverse_terms
 from tiengine.model.model import Model
 from tiengine.model.newmark import Newmark, inverse
 from tiengine.parameters.errors import InputError
+from tiengine.track.slab_matrices import seat_shapes
 
 from ..models import V350, paper_model
 

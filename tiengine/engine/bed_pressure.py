@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tiengine.engine.chunk import Chunk
+from tiengine.engine.window import slabs_in_slots
 from tiengine.model.model import Model
 from tiengine.parameters.arrays import Ints
 
@@ -49,7 +50,7 @@ def designs_in_slots(of_slab: Mapping[int, int], rear_slab: Ints, slots: int) ->
         rear_slab: Rear slab in memory, shape (rows,).
         slots: Slabs in memory.
     """
-    slab = rear_slab[:, None] + (np.arange(slots) - rear_slab[:, None]) % slots
+    slab = slabs_in_slots(rear_slab, slots)
     designs = np.zeros_like(slab)
     for number, design in of_slab.items():
         designs[slab == number] = design

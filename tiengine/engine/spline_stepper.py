@@ -64,11 +64,19 @@ class SplineStepper(Stepper):
         self.factored_speed = float("nan")
         self._window = (-1, -1)
         self._first = 0
+        self._planned: Plan | None = None
+        self._stays_end = np.zeros(0, dtype=np.bool_)
         self._explicit_bed = int(model.dims[at.MORTAR_MODE]) > 0
         self.bind()
 
     def seat_extremes_due(self, plan: Plan) -> Flags:
         """Steps after which the seats move on, and the last of a chunk: launches keep the extremes until then."""
+        if self._planned is not plan:
+            self._planned, self._stays_end = plan, self._ends_of_stays(plan)
+        return self._stays_end
+
+    def _ends_of_stays(self, plan: Plan) -> Flags:
+        """Find the steps after which window or tables change, once for all that ask about a plan."""
         due = np.ones(len(self.moves) + 1, dtype=np.bool_)
         window, factored = self._window, self.factored_speed
         for i in np.flatnonzero(self.moves).tolist():
@@ -89,6 +97,7 @@ class SplineStepper(Stepper):
             self._first, self.rows = int(plan.step[first]), Rows(*(int(values[last]) for values in plan))
             self.call((*self.stages, *(w for w, each in zip(self.watchers, due, strict=True) if each[last])))
             first = last + 1
+        self._planned = None  # the next one may be the same object, from another place
 
     def _will_record(self, plan: Plan) -> None:
         """Set the rows of the record that steps fill, and the rear slab then."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tiengine.kernels import layout as at
-from tiengine.parameters.arrays import Reals
+from tiengine.parameters.arrays import Ints, Reals
 from tiengine.track.slab import Slab
 
-__all__ = ["window_clock"]
+__all__ = ["slabs_in_slots", "window_clock"]
 
 
 def window_clock(slab: Slab, X: Reals, V: Reals, V_rate: Reals, reach: float = 0.0) -> Reals:
@@ -35,3 +35,14 @@ def window_clock(slab: Slab, X: Reals, V: Reals, V_rate: Reals, reach: float = 0
     clock[:, at.FIRST_SEAT_S] = (first + 0.5) * d - X
     clock[:, at.FIRST_SLAB] = np.floor(X / p)
     return clock
+
+
+def slabs_in_slots(rear_slab: Ints, slots: int) -> Ints:
+    """Compute the index of the slab in each slot, shape (rows, slots): slab i is in slot i modulo their number.
+
+    Args:
+        rear_slab: Rear slab in memory, shape (rows,).
+        slots: Slabs in memory.
+    """
+    rear = rear_slab[:, None]
+    return np.asarray(rear + (np.arange(slots) - rear) % slots)

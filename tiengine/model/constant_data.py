@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from tiengine.irregularity.irregularity import HALF_BASE
 from tiengine.kernels import layout as at
-from tiengine.model.implicit_seats import seat_inverse_terms, seat_shapes
+from tiengine.model.implicit_seats import seat_inverse_terms
 from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
-from tiengine.track.slab_matrices import SlabMatrices
+from tiengine.track.slab_matrices import SlabMatrices, seat_shapes
 from tiengine.vehicle.train import static_wheel_loads
 
 __all__ = ["CONTACT_TOLERANCE", "MassAndStiffness", "Model", "SlabOperators", "shared_arrays", "slab_operators"]

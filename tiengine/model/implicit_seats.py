@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from tiengine.model.newmark import Newmark, inverse
 from tiengine.track.fastening import Fastening
 from tiengine.track.rail import RailWindow
-from tiengine.track.slab_matrices import SlabMatrices
 
 
 def smearing(window: RailWindow, spacing: float) -> float:
@@ -64,32 +63,13 @@ def rail_inverses(
     )
 
 
-def seat_shapes(slab: SlabMatrices) -> NDArray[np.float64]:
-    """Slab coordinates to the motion at its seats: w left and right, dw/dy left and right, y.
-
-    Args:
-        slab: Its matrices; the last two coordinates are lateral displacement and yaw.
-
-    Returns:
-        Shape (dofs, 5 seats), seat by seat within each of the five.
-    """
-    seats = len(slab.seat_x)
-    shapes = np.zeros((slab.n, 5, seats))
-    for seat in range(seats):
-        for side in range(2):
-            shapes[slab.seat_index[seat, side], side, seat] = slab.seat_w[seat, side]
-            shapes[slab.seat_index[seat, side], 2 + side, seat] = slab.seat_slope[seat, side]
-        shapes[-2:, 4, seat] = 1.0, slab.seat_x[seat]
-    return shapes.reshape(slab.n, 5 * seats)
-
-
 def seat_inverse_terms(
     shapes: NDArray[np.float64], scale: NDArray[np.float64], fastening: Fastening, half_base: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Stiffness and damping of a slab's own motion against its fastenings.
 
     Args:
-        shapes: As from :func:`seat_shapes`, shape (n, 5 seats).
+        shapes: As from :func:`tiengine.track.slab_matrices.seat_shapes`, shape (n, 5 seats).
         scale: Factor of each fastening, shape (seats, 2).
         fastening: Their sound values.
         half_base: b [m].

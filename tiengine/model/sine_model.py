@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from tiengine.kernels import layout as at
 from tiengine.model.constant_data import MassAndStiffness, Model, shared_arrays, slab_operators
-from tiengine.model.implicit_seats import seat_shapes, smeared_fastening
+from tiengine.model.implicit_seats import smeared_fastening
 from tiengine.model.ingredients import Ingredients
 from tiengine.model.newmark import inverse
 from tiengine.model.speed_blocks import Blocks
@@ -18,6 +18,7 @@ from tiengine.parameters.arrays import Reals
 from tiengine.track.fastening import seat_tables
 from tiengine.track.rail import RailWindow
 from tiengine.track.sines import sine_products
+from tiengine.track.slab_matrices import seat_shapes
 
 __all__ = ["SineModel", "build_sine_model"]
 

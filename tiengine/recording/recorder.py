@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.stepper import Plan
+from tiengine.engine.window import slabs_in_slots
 from tiengine.kernels import layout as at
 from tiengine.result_files.channels import MORTAR, PATCH
 from tiengine.result_files.layout import DTYPES, Block, GroupSpec, TrainLabels
@@ -153,7 +154,7 @@ class Recorder:
         times = self._times(np.arange(first, first + len(position)), position)
         at_bodies = np.arange(first, first + len(position)) % self.body_every == 0
         pressure = chunk.mortar[:, : int(at_bodies.sum())]
-        held = _slabs_held(chunk.clock[: len(position)][at_bodies, at.FIRST_SLAB], pressure.shape[2])
+        held = slabs_in_slots(chunk.rear_slab[: pressure.shape[1]], pressure.shape[2]).astype(np.float64)
         return [self._block(Samples(chunk.wheel[b], chunk.body[b], held, pressure[b]), times, first) for b in rows]
 
     def block(self, samples: Samples, steps: NDArray[np.int64], position: NDArray[np.float64]) -> dict[str, Block]:
@@ -211,9 +212,3 @@ def _patches(wheel: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     along = found["longitudinal_creep_force"] * found["longitudinal_creepage"]
     found["wear_number"] = np.abs(along) + np.abs(found["lateral_creep_force"] * found["lateral_creepage"])
     return {name: found[name] for name in PATCH}
-
-
-def _slabs_held(first: NDArray[np.float64], slots: int) -> NDArray[np.float64]:
-    """Index of the slab in each slot, shape (steps, slots), from the window's rear slab, shape (steps,)."""
-    rear = first[:, None]
-    return rear + np.mod(np.arange(slots) - rear, slots)

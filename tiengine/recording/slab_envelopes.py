@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.engine.stepper import Stepper
-from tiengine.model.implicit_seats import seat_shapes
 from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
 from tiengine.recording.slab_moments import SlabMoments
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
+from tiengine.track.slab_matrices import seat_shapes
 
 __all__ = ["SlabEnvelopes", "SlotExtremes"]
 

@@ -24,7 +24,7 @@ from tiengine.result_files.output_file import check_output
 if TYPE_CHECKING:
     from tiengine.result_files.reader import Reader
 
-__all__ = ["export"]
+__all__ = ["export", "replacing"]
 
 CSV_VALUES = 100_000  # values in memory at once: 13 MB as strings
 PARQUET_VALUES = 1_000_000  # values in a row group: at most 8 MB
@@ -66,7 +66,7 @@ def export(
 
 def _write_csv(result: Reader, path: Path, train: int, channels: Sequence[str]) -> str:
     table = channel_table(result, train, channels)
-    with _replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(column.heading for column in table.columns)
         for piece in table.pieces(CSV_VALUES):
@@ -88,7 +88,7 @@ def _write_parquet(result: Reader, path: Path, train: int, channels: Sequence[st
         for column, dataset in zip(table.columns, datasets, strict=True)
     ]
     schema = pa.schema(fields, metadata={"scenario": result.scenario_toml, "train": str(train)})
-    with _replacing(path) as temporary, parquet.ParquetWriter(temporary, schema) as writer:
+    with replacing(path) as temporary, parquet.ParquetWriter(temporary, schema) as writer:
         for piece in table.pieces(PARQUET_VALUES):
             columns = [np.ascontiguousarray(column) for column in piece]
             writer.write_table(pa.Table.from_arrays([pa.array(column) for column in columns], schema=schema))
@@ -110,7 +110,7 @@ def _write_mat(result: Reader, path: Path, train: int, channels: Sequence[str]) 
     for channel, dataset in found.items():
         group, _, name = channel.rpartition("/")
         _add(_struct(structs, group, dataset.parent), name, dataset)
-    with _replacing(path) as temporary:
+    with replacing(path) as temporary:
         savemat(temporary, content, appendmat=False, long_field_names=True, do_compression=False, oned_as="column")
     return f"{len(found)} channels"
 
@@ -182,7 +182,7 @@ def _size(table: ChannelTable) -> str:
 
 
 @contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path) -> Iterator[Path]:
     """Temporary file that is renamed to its final name when complete, and removed otherwise."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:

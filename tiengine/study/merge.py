@@ -8,6 +8,7 @@ from typing import Any
 import h5py
 
 from tiengine.parameters.errors import InputError
+from tiengine.result_files.export import replacing
 from tiengine.result_files.output_file import check_output, header
 from tiengine.result_files.reader import COMPLETE, open_reader
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
@@ -35,26 +36,19 @@ def merge(folder: Folder, path: Path, *, force: bool = False) -> int:
     if left := folder.left():
         raise InputError(f"{folder.path}: {len(left)} tasks are not complete; resume the study first")
     scenario = _ensemble(folder.design)
-    temporary = path.with_name(f".{path.name}.part")
     failed = 0
-    try:
-        with h5py.File(temporary, "w", libver=("v110", "v110")) as file:
-            trains = file.create_group("trains")
-            for task, members in enumerate(folder.design.tasks):
-                if not folder.part(task).exists():
-                    raise InputError(f"{folder.part(task)}: missing; its trains were refused or the part was removed")
-                with open_reader(folder.part(task)) as part:
-                    for place, member in enumerate(members):
-                        part.file.copy(f"trains/{place:03d}", trains, name=f"{member:03d}")
-                        failed += part.status(place) != COMPLETE
-            status = COMPLETE if not failed else f"{failed} of {len(folder.design.members)} trains failed"
-            count = {"trains": len(folder.design.members)}
-            file.attrs.update({**header(to_toml(scenario)), "status": status, **count, **_sums(folder)})
-        temporary.replace(path)
-    except OSError as error:
-        raise InputError(f"output = '{path}': cannot be written ({error})") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as temporary, h5py.File(temporary, "w", libver=("v110", "v110")) as file:
+        trains = file.create_group("trains")
+        for task, members in enumerate(folder.design.tasks):
+            if not folder.part(task).exists():
+                raise InputError(f"{folder.part(task)}: missing; its trains were refused or the part was removed")
+            with open_reader(folder.part(task)) as part:
+                for place, member in enumerate(members):
+                    part.file.copy(f"trains/{place:03d}", trains, name=f"{member:03d}")
+                    failed += part.status(place) != COMPLETE
+        status = COMPLETE if not failed else f"{failed} of {len(folder.design.members)} trains failed"
+        count = {"trains": len(folder.design.members)}
+        file.attrs.update({**header(to_toml(scenario)), "status": status, **count, **_sums(folder)})
     return len(folder.design.members)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError, nearest
+from tiengine.result_files.export import replacing
 from tiengine.result_files.output_file import check_output
 from tiengine.result_files.reader import COMPLETE
 from tiengine.study.folder import Folder
@@ -92,9 +93,10 @@ class Table:
             except ImportError:
                 raise InputError(f"output = '{path}': Parquet needs pyarrow; pip install 'tiengine[parquet]'") from None
             columns = {name: pa.array(_plain(column)) for name, column in self.columns.items()}
-            parquet.write_table(pa.table(columns), path)
+            with replacing(path) as temporary:
+                parquet.write_table(pa.table(columns), temporary)
             return
-        with path.open("w", newline="", encoding="utf-8") as file:
+        with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(self.columns)
             rows = zip(*(_plain(column) for column in self.columns.values()), strict=True)

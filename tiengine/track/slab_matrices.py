@@ -57,6 +57,25 @@ class SlabMatrices:
     bed_weight_pressure: NDArray[np.float64]
 
 
+def seat_shapes(slab: SlabMatrices) -> NDArray[np.float64]:
+    """Slab coordinates to the motion at its seats: w left and right, dw/dy left and right, y.
+
+    Args:
+        slab: Its matrices; the last two coordinates are lateral displacement and yaw.
+
+    Returns:
+        Shape (dofs, 5 seats), seat by seat within each of the five.
+    """
+    seats = len(slab.seat_x)
+    shapes = np.zeros((slab.n, 5, seats))
+    for seat in range(seats):
+        for side in range(2):
+            shapes[slab.seat_index[seat, side], side, seat] = slab.seat_w[seat, side]
+            shapes[slab.seat_index[seat, side], 2 + side, seat] = slab.seat_slope[seat, side]
+        shapes[-2:, 4, seat] = 1.0, slab.seat_x[seat]
+    return shapes.reshape(slab.n, 5 * seats)
+
+
 def slab_matrices(
     slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid] = (), baseplate: tuple[float, float] = POINT
 ) -> SlabMatrices:

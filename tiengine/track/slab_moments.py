@@ -39,7 +39,7 @@ from tiengine.track.fastening import POINT
 from tiengine.track.mortar import GAUSS, Mortar
 from tiengine.track.plate_shapes import WX, WXX, WY, WYY, W, element_dofs, locate, shapes_at, tabulate_shapes
 from tiengine.track.slab import Slab
-from tiengine.track.slab_matrices import SlabMatrices
+from tiengine.track.slab_matrices import SlabMatrices, seat_shapes
 
 __all__ = [
     "GAUSS_POINTS", "MomentTable", "fine_mesh", "moment_rows", "moment_table", "moments_of_motion",
@@ -185,13 +185,8 @@ def moments_of_pressure(slab: Slab, design: SlabMatrices, by_pressure: MomentTab
 
 def _seat_forces_of_loads(design: SlabMatrices) -> Reals:
     """Forces of the seats, as in a table, from loads on the step's mesh that they make up, shape (n, 4 seats)."""
-    seats = len(design.seat_x)
-    loads = np.zeros((design.n, 4, seats))
-    for seat in range(seats):
-        for side in range(2):
-            loads[design.seat_index[seat, side], side, seat] = design.seat_w[seat, side]
-            loads[design.seat_index[seat, side], 2 + side, seat] = design.seat_slope[seat, side]
-    inverse: Reals = np.asarray(np.linalg.pinv(loads.reshape(design.n, -1)), np.float64)
+    loads = seat_shapes(design)[:, : 4 * len(design.seat_x)]
+    inverse: Reals = np.asarray(np.linalg.pinv(loads), np.float64)
     return inverse.T
 
 
