@@ -122,6 +122,7 @@ def profile(
 @click.option("--half-spacing", type=float, default=0.7465, show_default=True, help="Of the tape circles [m].")
 @click.option("--wheel-radius", type=float, default=0.43, show_default=True, help="At the tape circle [m].")
 @click.option("--tape-circle", type=float, help="Distance of the tape circle outward from the wheel file's y = 0 [m].")
+@click.option("--rail-axis", type=float, help="The rail file's y at the axis of an upright rail [m].")
 @click.option("--allow-kinks", is_flag=True, help="Accept kinks where wheel and rail can touch.")
 @click.option("--mirror-rail/--no-mirror-rail", default=None, help="The rail's gauge face is at positive y, or not.")
 @click.option("--smoothing", type=click.FloatRange(0.0, 5e-3), help="Of points; 0.0005 for measured profiles [m].")
@@ -140,6 +141,7 @@ def contact(
     as_json: bool,
     canted: bool | None,
     tape_circle: float | None,
+    rail_axis: float | None,
     allow_kinks: bool,
     mirror_rail: bool | None,
     smoothing: float | None,
@@ -162,7 +164,15 @@ def contact(
         check_output(output, force=True)
     report = contact_report(
         load_profile(wheel, "wheel", smoothing=length, tape_circle=tape_circle, allow_kinks=allow_kinks),
-        load_profile(rail, "rail", smoothing=length, has_cant=canted, mirror=mirror_rail, allow_kinks=allow_kinks),
+        load_profile(
+            rail,
+            "rail",
+            smoothing=length,
+            has_cant=canted,
+            mirror=mirror_rail,
+            allow_kinks=allow_kinks,
+            rail_axis=rail_axis,
+        ),
         build(ContactSettings, placement, "contact"),
         largest,
         method,
