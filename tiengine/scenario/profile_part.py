@@ -46,8 +46,7 @@ class ProfilePoints(Params):
     @property
     def placement(self) -> Placement:
         """Statements about the points."""
-        keys = Placement.__dataclass_fields__
-        return Placement(**{key: getattr(self, key) for key in keys})
+        return Placement(self.has_cant, self.smoothing, self.mirror, self.tape_circle, self.allow_kinks, self.rail_axis)
 
 
 def profile_table(path: Path, kind: Kind, where: str, stated: Mapping[str, Any]) -> dict[str, Any]:
