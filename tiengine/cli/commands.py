@@ -6,9 +6,11 @@ import Taichi, so that the others start fast.
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import signal
+import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -30,6 +32,9 @@ class _Commands(click.Group):
 
     def invoke(self, context: click.Context) -> Any:
         """Run a command."""
+        if sys.stdout is None or sys.stderr is None:  # closed by whoever started this process
+            nowhere = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - until the process ends
+            sys.stdout, sys.stderr = sys.stdout or nowhere, sys.stderr or nowhere
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("always", InputNote)
@@ -46,6 +51,11 @@ class _Commands(click.Group):
         except InputError as error:
             click.echo(f"error: {' '.join(str(error).split())}", err=True)
             context.exit(2)
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EIO, errno.EDQUOT) or error.filename is not None:
+                raise
+            click.echo(f"error: standard output: {error.strerror}", err=True)
+            context.exit(1)
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
