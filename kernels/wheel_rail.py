@@ -23,6 +23,10 @@ THIRD_OF_EXPONENTS = 715094163 << 32
 """Two thirds of the bias of a double's exponent, less what makes the first cube root's error least."""
 
 
+SMALL_ANGLE = 0.1
+"""rad, up to which five terms of the series leave less than 1e-21 of sine and 2e-21 of cosine."""
+
+
 @ti.func
 def catmull_rom(f: float):
     """Weights of the four taps around a cell at fraction f in [0, 1]: C1 in the argument."""
@@ -52,6 +56,19 @@ def lookup(u: float, alpha: float, table: Array, constants: Array, patch: Templa
             for column in ti.static(range(at.N_TABLE)):
                 value[column] += weight * table[i + m - 1, j + n - 1, patch * at.N_TABLE + column]
     return value
+
+
+@ti.func
+def sine_and_cosine(x: float):
+    """Sine and cosine; of small angles by their series, to rounding, in a quarter of the time."""
+    s, c = 0.0, 0.0
+    if ti.abs(x) < SMALL_ANGLE:
+        y = x * x
+        s = x * (1.0 - y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (1.0 - y / 110.0)))))
+        c = 1.0 - y / 2.0 * (1.0 - y / 12.0 * (1.0 - y / 30.0 * (1.0 - y / 56.0 * (1.0 - y / 90.0))))
+    else:
+        s, c = ti.sin(x), ti.cos(x)
+    return s, c
 
 
 @ti.func
@@ -106,9 +123,11 @@ def contact_state(
     u = sigma * ((x[0] - r0 * x[2]) - (v + h_r * theta_x + y_irr))
     alpha = sigma * (x[2] - theta_x - turn)
     g = lookup(u, alpha, table, constants, patch)
-    gamma = ti.atan2(g[at.TAN_GAMMA], 1.0)
-    gamma_t = gamma - sigma * (theta_x + turn)
-    c, s = ti.cos(gamma_t), ti.sin(gamma_t)
+    cos_gamma = 1.0 / ti.sqrt(1.0 + g[at.TAN_GAMMA] * g[at.TAN_GAMMA])
+    sin_gamma = g[at.TAN_GAMMA] * cos_gamma
+    sin_turn, cos_turn = sine_and_cosine(sigma * (theta_x + turn))
+    sin_alpha, cos_alpha = sine_and_cosine(alpha)
+    c, s = cos_gamma * cos_turn + sin_gamma * sin_turn, sin_gamma * cos_turn - cos_gamma * sin_turn
     s_w, s_r, r_c = g[at.S_WHEEL], g[at.S_RAIL], g[at.RADIUS]
     h_c = h_r - (r_c - r0)
     p = (
@@ -134,10 +153,10 @@ def contact_state(
     )
     xi_x = (V * (1.0 - r_c / r0) + dx[3] * r_c - sigma * (b0 + s_w) * dx[4]) / V
     xi_y = (across * c - sigma * down * s) / V
-    xi_s = (-sigma * (V / r0) * ti.sin(gamma + alpha) + dx[4] * c) / V
+    xi_s = (-sigma * (V / r0) * (sin_gamma * cos_alpha + cos_gamma * sin_alpha) + dx[4] * c) / V
     return ti.Vector(
         [
-            p * ti.cos(gamma),
+            p * cos_gamma,
             xi_x,
             xi_y,
             xi_s,
