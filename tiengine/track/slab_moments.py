@@ -28,6 +28,8 @@ baseplate the moment below them is that of an element of the fine mesh and means
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
@@ -108,6 +110,7 @@ class MomentTable:
         self.places, self.matrix = where, matrix
 
 
+@lru_cache(maxsize=4)  # a task asks again for the table of the last one
 def moment_table(
     slab: Slab, mortar: Mortar | None, baseplate: tuple[float, float] = POINT, fine: Slab | None = None
 ) -> MomentTable:
