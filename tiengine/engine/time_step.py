@@ -34,7 +34,7 @@ LAG = 0.2
 0.3 % of their peak (0.64 % at 0.27, 1.8 % at 0.47; two passes, seats stiffened by 3 to 10)."""
 
 _passed: set[tuple[str, float, int, float, int]] = set()
-"""Trials that steps have stood in this process: the tasks of an ensemble, and runs that follow each other, share them."""
+"""Trials that steps have stood in this process; the tasks of an ensemble share them."""
 
 MORE_PASSES = 2
 """Passes that advice tries beyond those of the scenario."""
