@@ -18,7 +18,8 @@ The root attribute ``status`` is "running" until the run has ended.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
@@ -239,10 +240,9 @@ class Writer:
             expected = (len(along), *columns[name].sample_shape)
             if value.shape != expected:
                 raise ValueError(f"{group}/{name}: shape {value.shape}, expected {expected}")
-            try:
+        with self._disk_errors():
+            for name, value in values.items():
                 columns[name].extend(value)
-            except OSError as error:
-                raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
 
     def commit(self) -> None:
         """Make all written data permanent; readers see them from now on.
@@ -250,6 +250,7 @@ class Writer:
         Raises:
             InputError: The disk is full or has failed.
         """
+        self._flush()
         self._output.commit()
         self._samples_kept |= self._samples_written
 
@@ -265,6 +266,7 @@ class Writer:
         Raises:
             InputError: The file cannot be completed; it holds the last commit.
         """
+        self._flush()
         result = self._output.complete(attributes)
         self._finished = True
         return result
@@ -274,6 +276,21 @@ class Writer:
         if not self._finished:
             self._finished = True
             self._output.leave(keep=self._samples_kept)
+
+    def _flush(self) -> None:
+        """Hand all samples that still wait in memory to HDF5."""
+        with self._disk_errors():
+            for columns in self._columns.values():
+                for column in columns.values():
+                    column.flush()
+
+    @contextmanager
+    def _disk_errors(self) -> Iterator[None]:
+        """Convert errors of the disk."""
+        try:
+            yield
+        except OSError as error:
+            raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
 
     def _create_train(self, train: Any, labels: TrainLabels) -> None:
         """Create the groups, scales and empty channels of one train."""
