@@ -13,11 +13,13 @@ from tiengine.irregularity.wheel_shapes import wheel_tables
 from tiengine.model.given_sources import given_sources
 from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.model.newmark import Newmark
+from tiengine.parameters.conventions import SIDES
+from tiengine.parameters.errors import InputError
 from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.defects import fastening_factors
 from tiengine.track.slab_matrices import slab_designs
-from tiengine.vehicle.train import assemble
+from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads
 
 __all__ = ["ingredients"]
 
@@ -41,6 +43,7 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         effort=asked.effort,
         couplings=parts.couplings,
     )
+    _check_wheel_loads(train)
     if scenario.track.line is not None or scenario.wind.speed is not None or asked.forces:
         train = replace(train, K=train.K + train.K_leaning)
     return Ingredients(
@@ -67,6 +70,18 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         shaped=bool(shapes or scenario.track.rail_shapes or scenario.track.settlements),
         out_of_round=wheel_tables(shapes, parts.wheel_radii) if shapes else None,
     )
+
+
+def _check_wheel_loads(train: TrainModel) -> None:
+    """Refuse vehicles that do not stand on all of their wheels."""
+    loads = static_wheel_loads(train)
+    w, side = np.unravel_index(int(np.argmin(loads)), loads.shape)
+    if loads[w, side] <= 0.0:
+        raise InputError(
+            f"train.vehicles: wheelset {w + 1} {SIDES[side]} would carry {1e-3 * loads[w, side]:.3g} kN at rest; all"
+            " wheels must carry: do the centres of gravity (x, y) lie between them, are masses in kg and stiffnesses in"
+            " N/m?"
+        )
 
 
 def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64]]:
