@@ -70,7 +70,7 @@ class MovingGround:
             rear_slab: Index of the rear slab then, shape (steps,).
         """
         slab = slabs_in_slots(rear_slab.astype(np.int64), self._slots)
-        return self._acceleration(time, (slab + 0.5) * self._slab.pitch)
+        return self._acceleration(time, np.asarray((slab + 0.5) * self._slab.pitch, np.float64))
 
     def _acceleration(self, time: Reals, x: Reals) -> Reals:
         """Acceleration of the ground at chainages [m] of shape (steps, m), shape (steps, m, 2)."""

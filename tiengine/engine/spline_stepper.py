@@ -64,7 +64,7 @@ class SplineStepper(Stepper):
             tables.seats, tables.slabs,
             Suspension(train.element_row, train.element_kind, train.element_linear, train.element_table),
             state.wheels, chunk.clock, chunk.irregularity, chunk.wheel, chunk.body,
-            self._slab_record, state.bed, self.loads, self.ground and self.ground.slab_inertia,
+            self._slab_record, state.bed, self.loads, None if self.ground is None else self.ground.slab_inertia,
         )  # fmt: skip
         self._compiled = self.launch.launch.compile_seconds
         self.factored_speed = float("nan")

@@ -29,7 +29,9 @@ __all__ = ["BaseMotion", "GroundRecord", "check_record"]
 STEPS_PER_PERIOD = 8.0
 NEGLIGIBLE_SHARE = 1e-3
 """Share of the variance of acceleration that the record may hold at frequencies which the time step does not follow."""
-SHORTEST_WAVE = 10.0  # m: the track is taken to follow; rails on their seats bend out of shorter waves by 1.5 %
+SHORTEST_WAVE = 20.0
+"""Shortest wave [m] of the ground that counts: the track is taken to follow the ground, from which slabs, rigid
+laterally, stand out by (2 pi L/wave)^2/12 of its displacement at their ends."""
 SLOWEST_WAVE = 20.0  # m/s
 
 
