@@ -117,7 +117,7 @@ def _moments(axes: Axes, slabs: Extremes) -> None:
 
 
 def _shapes(train: Train) -> Iterator[Callable[[Axes], None]]:
-    """Functions that draw shapes of rails and displaced ground, where there are such and their files are still there."""
+    """Functions that draw shapes of rails and displaced ground, where there are such and their files still exist."""
     for profile in (_rails, _ground):
         with suppress(AbsentError, InputError):
             yield profile(train)
