@@ -192,9 +192,11 @@ class SplineStepper(Stepper):
         self.chunk.filled = body_rows
         held, slots = self.state.held, self.state.slots
         shape = (held.trains, -1, held.groups, held.slab_dofs, 3, 8)
-        recorded = self._slab_record.reshape(shape)[:, :body_rows].transpose(0, 1, 4, 2, 5, 3)
-        by_slot = recorded.reshape(held.trains, body_rows, 3, 8 * held.groups, held.slab_dofs)
-        self.chunk.slab[:, :body_rows] = by_slot[..., :slots, :]
+        recorded = self._slab_record.reshape(shape)[:, :body_rows].transpose(0, 1, 2, 4, 5, 3)
+        for group in range(held.groups):  # without a copy of the record in between
+            first = 8 * group
+            lanes = min(slots - first, 8)
+            self.chunk.slab[:, :body_rows, :, first : first + lanes] = recorded[:, :, group, :, :lanes]
         if not self._explicit_bed:  # else they are known from the forces
             fill_pressures(self.model, self.chunk)
 
