@@ -35,11 +35,13 @@ BASE: dict[str, Any] = {
         "distance": 30.0,
         "wheel_profile": {"points": "\n".join(f"{y} {y * y / 2000.0}" for y in range(-30, 31, 3))},
         "couplings": [{"part": "EMU_intercar", "behind": [1]}],
+        "wheel_profiles": [{"wheelsets": [2], "side": "left", "profile": "LMA", "radius": 0.431}],
         "wheel_shapes": [{"kind": "harmonics", "wheelsets": [2], "order": [3], "amplitude": [1e-4]}],
         "forces": [{"motion": "z", "rows": [[0.0, 0.0], [0.1, 1e4]]}],
     },
     "track": {
         "rail": "CHN60",
+        "rail_profile_right": "60E1",
         "slab": "CRTS_III",
         "fastening": {"like": "ACE2021", "vertical_stiffness": 5e7},
         "failed_fastenings": [{"seats": [40, 42], "rail": "left", "factor": 0.5}],

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
+from tiengine.contact.wheel_contacts import WheelContacts
 from tiengine.irregularity.wheel_shapes import WheelTables
 from tiengine.kernels import layout as at
 from tiengine.model.newmark import Newmark
@@ -56,7 +57,8 @@ class Ingredients:
         mortar: Its bed.
         designs: The different slabs.
         train: Vehicles.
-        contact: Contact geometry of wheel and rail.
+        contact: Contact geometry of wheel and rail; that of the first left wheel where they differ.
+        contacts: Contact of every wheel where wheels or rails differ, else None.
         friction: Coefficient of friction.
         cross_level_rolls: Whether a cross level turns the railheads.
         length: Window l [m].
@@ -95,6 +97,7 @@ class Ingredients:
     absorbing_zone: float = 0.0
     shaped: bool = False
     out_of_round: WheelTables | None = None
+    contacts: WheelContacts | None = None
     trains: int = 1
     given: tuple[LoadSource, ...] = ()
 
@@ -106,6 +109,11 @@ class Ingredients:
     def given_loads(self, time: Reals, x: Reals, V: Reals, V_rate: Reals) -> GivenLoads | None:
         """Sum of the given loads, None if there are none; arguments as in :class:`LoadSource`."""
         return sum_of_loads(self.given, self.train, time, x, V, V_rate) if self.given else None
+
+    @property
+    def contact_values(self) -> Reals:
+        """Contact tables of all wheels, shape (tables n_u, n_alpha, 10 patches)."""
+        return self.contact.values if self.contacts is None else self.contacts.values
 
     @property
     def channels(self) -> int:
