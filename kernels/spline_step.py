@@ -12,7 +12,8 @@ A step t_n -> t_{n+1} of a chunk of trains, which stays in the cache meanwhile; 
       wheels' forces by one-sided columns into y; backward sweep a = U^-1 y; u = u~ + beta dt^2 a, v = v~ + gamma dt a
       slabs: loads of the seats, bed where it is explicit, banded solve, correctors; cars' correctors
 
-Between launches rows U, V, A of all arrays hold the state at the last step's end, for reading and writing.
+Between launches rows U, V, A of all arrays hold the state at the last step's end, for reading and writing. A launch of
+several steps that looks at the state (``spline_squares``) leaves out those after one at which a guard must check it.
 """
 
 from typing import Any
@@ -24,6 +25,7 @@ from tiengine.kernels import contact as ct
 from tiengine.kernels import layout, spline_rail
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels import spline_seats as seats
+from tiengine.kernels import spline_squares as squares
 from tiengine.kernels import spline_wheels as wheels
 from tiengine.kernels import vehicle_columns as cars
 from tiengine.kernels.types import Array, Ints1, Ints2, Ints3, Reals1, Reals2, Reals3, Reals4, Reals5, Template
@@ -84,6 +86,8 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, own:
     @ti.kernel
     def spline_steps(
         job: Ints1,
+        limits: Reals1,
+        stopped_out: Ints1,
         record: Ints1,
         size: Ints1,
         dims: Ints1,
@@ -154,6 +158,8 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, own:
             c = chunk_step // job[at.STEPS]
             step = job[at.FIRST_STEP] + chunk_step % job[at.STEPS]
             n, dofs, stages = size[at.FUNCTIONS], size[at.SLAB_DOFS], job[at.STAGES]
+            if stopped_out[0] >= 0:
+                stages = 0
             V, V_rate, s0 = clock[step, layout.SPEED], clock[step, layout.SPEED_RATE], clock[step, layout.FIRST_SEAT_S]
             dt, beta_dt2, gamma_dt = constants[layout.DT], constants[layout.BETA_DT2], constants[layout.GAMMA_DT]
             base2 = constants[layout.HALF_BASE] * constants[layout.HALF_BASE]
@@ -279,5 +285,12 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, own:
                     if ahead == 1:
                         for g in range(b0 * groups, (b0 + trains_a_chunk) * groups):
                             slabs.predict(slab, g * (dofs + 2 * K) + K, dofs, constants)
+            if stages != 0 and job[at.LOOK_EVERY] > 0:
+                if (job[at.STEPS_BEFORE] + step + 1) % job[at.LOOK_EVERY] == 0:
+                    found = job[at.LOOK_ALWAYS]
+                    if found == 0:
+                        found = squares.needs_check(limits, dims, rail, slab, car, contact, force, lanes, blocks)
+                    if found == 1:
+                        stopped_out[0] = step
 
     return spline_steps

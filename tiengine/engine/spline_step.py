@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.engine.load_rows import LoadRows
+from tiengine.engine.lookout import Lookout
 from tiengine.engine.spline_arrays import SplineArrays
 from tiengine.engine.spline_tables import RailTables, SeatTables, SlabTables, Spans
 from tiengine.engine.vector_mode import VectorLaunch
@@ -100,6 +101,8 @@ class SplineStep:
     Attributes:
         state: What is advanced, in place.
         job: First step, number of steps, stages (``spline_layout``) of the next launch.
+        limits: Limits of a sound state, see ``spline_layout``, shape (N_LIMITS,).
+        one_chunk: Whether all trains are in one chunk, so that a launch can stop between two steps.
         record: Row of the bodies' record that each step fills, -1 for none, shape (steps,).
         launch: The bound kernel; ``launch.vector_mode`` tells how it was compiled.
     """
@@ -155,10 +158,13 @@ class SplineStep:
         size[at.LOAD_STEP], size[at.LOAD_TRAIN] = loads.step // 8, loads.train // 8
         car_load = loads.array.reshape(-1, 8)
         self.state, self.size = state, size
-        self.job = np.array([0, 1, at.ALL_STAGES], dtype=np.int32)
+        self.job = np.zeros(at.N_JOB, dtype=np.int32)
+        self.job[at.STEPS], self.job[at.STAGES] = 1, at.ALL_STAGES
+        self.limits, self._stopped = np.zeros(at.N_LIMITS), np.full(1, -1, dtype=np.int32)
+        self.one_chunk = bool(size[at.CHUNKS] == 1)
         self.record = np.full(len(clock), -1, dtype=np.int32)
         arrays = (
-            self.job, self.record, size, dims, constants, clock,
+            self.job, self.limits, self._stopped, self.record, size, dims, constants, clock,
             state.rail, rails.coefficient,
             state.seat, seats.point, spans.span, seats.place, seats.shape,
             state.slab, state.slab_seat, state.slab_design, slab_record, slabs.coefficient,
@@ -186,3 +192,20 @@ class SplineStep:
         """Advance to the end of step ``first + steps - 1`` of the chunk; no seat or slab may enter within."""
         self.job[at.FIRST_STEP], self.job[at.STEPS] = first, steps
         self.launch()
+
+    def up_to_check(self, first: int, steps: int, lookout: Lookout) -> tuple[int, bool]:
+        """Advance likewise, but not beyond a step after which a guard must check the state.
+
+        Args:
+            first: Row of the first step.
+            steps: Steps at most.
+            lookout: Where to stop; its limits must be in :attr:`limits`.
+
+        Returns:
+            Row of the next step, and whether the state must be checked before it.
+        """
+        self.job[at.LOOK_EVERY], self.job[at.STEPS_BEFORE] = lookout.every, lookout.steps_before
+        self.job[at.LOOK_ALWAYS], self._stopped[0] = lookout.always, -1
+        self(first, steps)
+        stopped, self._stopped[0], self.job[at.LOOK_EVERY] = int(self._stopped[0]), -1, 0
+        return (stopped + 1, True) if stopped >= 0 else (first + steps, False)

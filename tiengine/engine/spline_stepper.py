@@ -10,6 +10,7 @@ from tiengine.engine.aligned import aligned_zeros
 from tiengine.engine.bed_pressure import fill_pressures
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.load_rows import LoadRows
+from tiengine.engine.lookout import Lookout
 from tiengine.engine.spline_state import SplineState
 from tiengine.engine.spline_step import SplineStep, Suspension
 from tiengine.engine.stepper import Plan, Rows, Stage, Stepper
@@ -64,6 +65,7 @@ class SplineStepper(Stepper):
         self.factored_speed = float("nan")
         self._window = (-1, -1)
         self._first = 0
+        self._lookout: Lookout | None = None
         self._planned: Plan | None = None
         self._stays_end = np.zeros(0, dtype=np.bool_)
         self._explicit_bed = int(model.dims[at.MORTAR_MODE]) > 0
@@ -143,9 +145,24 @@ class SplineStepper(Stepper):
             V = factored
         return moved != window or V != factored, moved, V
 
+    def look_out(self, lookout: Lookout) -> bool:
+        """Let launches stop where a guard must check the state; see the base class."""
+        if not self.launch.one_chunk:
+            return False
+        self._lookout = lookout
+        self.launch.limits[:] = lookout.limits
+        return True
+
     def _advance(self) -> None:
-        """Take the steps of a launch."""
-        self.launch(self._first, self.rows.step + 1 - self._first)
+        """Take the steps of a launch, in several ones where a guard must check the state in between."""
+        first, end = self._first, self.rows.step + 1
+        if self._lookout is None:
+            self.launch(first, end - first)
+        else:
+            while first < end:
+                first, check = self.launch.up_to_check(first, end - first, self._lookout)
+                if check:
+                    self._lookout.check(first - 1)
 
     def _record_pressure(self) -> None:
         """Keep the pressures of an explicit bed if this step records the bodies."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.load_rows import LoadRows
+from tiengine.engine.lookout import Lookout
 from tiengine.engine.state import State
 from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
@@ -144,6 +145,17 @@ class Stepper(ABC):
         place = len(names) if before is None else names.index(before)
         self.watchers.insert(place, (name, call))
         self.due.insert(place, due)
+
+    def look_out(self, lookout: Lookout) -> bool:
+        """Check the state from time to time within the steps that are taken at once.
+
+        Args:
+            lookout: Says when, and what is to be called.
+
+        Returns:
+            Whether this kind of step can do it; if not, a guard must be a watcher.
+        """
+        return False
 
     def time_stages(self, mark: Callable[[str], object] | None) -> None:
         """Let a clock be read within the coming steps, or no longer.

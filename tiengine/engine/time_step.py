@@ -33,6 +33,9 @@ LAG = 0.2
 """Largest :attr:`tiengine.track.seat_passes.SeatPasses.lag` with a step that "auto" selects: wheel forces are within
 0.3 % of their peak (0.64 % at 0.27, 1.8 % at 0.47; two passes, seats stiffened by 3 to 10)."""
 
+_passed: set[tuple[str, float, int, float, int]] = set()
+"""Trials that steps have stood in this process; the tasks of an ensemble share them."""
+
 MORE_PASSES = 2
 """Passes that advice tries beyond those of the scenario."""
 
@@ -114,6 +117,9 @@ def _waves_of_shapes(scenario: Scenario, tables: WheelTables | None) -> list[tup
 def _instability(scenario: Scenario, model: Model, lanes: int) -> str:
     """How the step of a model fails the trials over the scenario's run: on sound seats, on all as its stiffest."""
     V, stiffest = scenario.train.speed.fastest, largest_factor(scenario.track.failed_fastenings)
+    trial = (_Key.of(scenario).text, model.ingredients.newmark.dt, model.ingredients.passes, V, lanes)
+    if trial in _passed:
+        return ""
     steps = scenario.train.distance / (V * model.ingredients.newmark.dt)
     tracks = [("", model)]
     if stiffest > 1.0:
@@ -123,6 +129,7 @@ def _instability(scenario: Scenario, model: Model, lanes: int) -> str:
         growth = step_growth(tried, V, steps, lanes)
         if not growth.tolerable(steps):
             return f"an oscillation{seats} grows by a factor {growth.over(100):.3g} in 100 steps"
+    _passed.add(trial)
     return ""
 
 

@@ -68,7 +68,7 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         absorbing_zone=numerics.absorbing_zone,
         explicit_mortar=numerics.mortar == "explicit",
         given=given_sources(scenario, train),
-        shaped=bool(shapes or scenario.track.rail_shapes or scenario.track.settlements),
+        shaped=bool(shapes or scenario.track.rail_shapes or scenario.track.ground),
         out_of_round=wheel_tables(shapes, parts.wheel_radii) if shapes else None,
     )
 

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from tiengine.irregularity.ground import Ground
 from tiengine.irregularity.rail_shapes import RailShape
 from tiengine.irregularity.wheel_shapes import WheelShape
 from tiengine.parameters.quantity import Params, Q
@@ -23,7 +24,6 @@ from tiengine.track.alignment_file import MOST_ROWS
 from tiengine.track.defects import FailedFastenings
 from tiengine.track.knots import Grading
 from tiengine.track.mortar import MortarVoid
-from tiengine.track.settlement import Settlement
 from tiengine.vehicle.assembly import Effort
 from tiengine.vehicle.force_history import BodyForce
 from tiengine.vehicle.speed_programme import SpeedProfile
@@ -155,8 +155,7 @@ class Track(Params):
         tuple[MortarVoid, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
     rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
-
-    settlements: Annotated[tuple[Settlement, ...], Field(description="tables, see below", max_length=1000)] = ()
+    ground: Annotated[tuple[Ground, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
 
     @property
     def line(self) -> Alignment | None:

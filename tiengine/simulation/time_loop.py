@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import zip_longest
 from typing import Any
 
@@ -20,6 +21,7 @@ from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Plan, Stepper
 from tiengine.engine.time_step import prepare
+from tiengine.irregularity.ground import ground_shape, reach_of
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.irregularity.rail_shapes import RailShapes, SettledRail
 from tiengine.irregularity.shaped_channels import ShapedChannels
@@ -248,17 +250,18 @@ def _shapes(scenario: Scenario, model: Model, start: float) -> ShapedChannels | 
     g = model.ingredients
     settled = [
         SettledRail(
-            *settled_rail(
-                each,
+            settled_rail(
+                partial(ground_shape, each),
+                reach_of(each),
                 g.rail,
                 g.fastening,
                 g.slab,
-                g.mortar.stiffness,
+                g.mortar,
                 lambda slab: g.designs.matrices[g.designs.of_slab.get(slab, 0)],
                 g.seat_factors,
             )
         )
-        for each in scenario.track.settlements
+        for each in scenario.track.ground
     ]
     return ShapedChannels(RailShapes(scenario.track.rail_shapes, settled), start + train.wheelset_x, train.wheel_radius)
 
