@@ -66,7 +66,7 @@ def sweep_slabs(
             slabs.clear_loads(slab, base, dofs)
 
 
-def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> Any:
+def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, hanging: int) -> Any:
     """Make the kernel.
 
     Args:
@@ -75,6 +75,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
         blocks: Vectors in a row of a car.
         patches: Patches a wheel.
         shaped: 1 if rails have shapes or wheels are out of round.
+        hanging: 1 if some seats hang.
     """
     lane_vectors = ti.types.ndarray(dtype=ti.types.vector(lanes, ti.f64), ndim=1)
     eights = ti.types.ndarray(dtype=ti.types.vector(8, ti.f64), ndim=1)
@@ -93,6 +94,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
         coefficient: Reals1,
         # seats
         seat: lane_vectors,
+        seat_play: lane_vectors,
         seat_point: Reals2,
         span: Reals2,
         seat_place: Ints2,
@@ -197,7 +199,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
                 if stages & at.SEAT_FORCE_STAGE:
                     seats.seat_forces(
                         c, first, row_u, row_v, s0, last_pass, size, constants, seat_place, seat_shape, rail, seat,
-                        lanes,
+                        seat_play, hanging, lanes,
                     )  # fmt: skip
                 if stages & at.FORWARD_STAGE:
                     if p == 0:

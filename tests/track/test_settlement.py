@@ -90,9 +90,3 @@ def test_bad_settlements_are_refused(scenario, table, said):
         load_scenario(scenario, [f"track.settlements=[{{{table}}}]"])
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_a_bed_without_tension_is_refused():
-    table = "track.settlements=[{kind='cosine', at=100, length=20, depth=0.01}]"
-    with pytest.raises(InputError, match=r"track\.settlements: must be left out with a bed that transmits no tension"):
-        load_scenario("default", [table, "track.mortar_no_tension=true"])

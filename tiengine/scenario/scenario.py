@@ -37,6 +37,7 @@ from tiengine.track.fastening import check_baseplate
 from tiengine.track.knots import graded_knots
 from tiengine.track.seat_points import seat_points
 from tiengine.track.sines import Sines
+from tiengine.track.slab_warp import check_slab_warps
 from tiengine.track.splines import Splines
 from tiengine.vehicle.train import centre_in_window
 
@@ -264,6 +265,8 @@ def _check(scenario: Scenario) -> None:
         end=scenario.rear + scenario.train.distance + window,
         slab=parts.slab,
     )
+    last_slab = int((scenario.rear + scenario.train.distance + window) / parts.slab.pitch)
+    check_slab_warps(scenario.track.slab_warps, last_slab)
     check_gauges(
         scenario.gauges, begin=scenario.rear, end=scenario.rear + scenario.train.distance + window, slab=parts.slab
     )

@@ -23,6 +23,7 @@ from tiengine.track.defects import FailedFastenings
 from tiengine.track.knots import Grading
 from tiengine.track.mortar import MortarVoid
 from tiengine.track.settlement import Settlement
+from tiengine.track.slab_warp import SlabWarp
 from tiengine.vehicle.assembly import Effort
 from tiengine.vehicle.force_history import BodyForce
 from tiengine.vehicle.speed_programme import SpeedProfile
@@ -149,6 +150,7 @@ class Track(Params):
     rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
 
     settlements: Annotated[tuple[Settlement, ...], Field(description="tables, see below", max_length=1000)] = ()
+    slab_warps: Annotated[tuple[SlabWarp, ...], Field(description="tables, see below", max_length=1000)] = ()
 
     @property
     def line(self) -> Alignment | None:

@@ -32,6 +32,7 @@ from tiengine.result_files.layout import Block, TrainLabels
 from tiengine.scenario.scenario import Scenario
 from tiengine.simulation.messages import Advanced
 from tiengine.simulation.tasks import Task
+from tiengine.track.dead_state import LaidRail
 from tiengine.track.settled_rail import settled_rail
 
 __all__ = ["CHUNK_STEPS", "LoopTimer", "Run"]
@@ -258,9 +259,11 @@ def _shapes(scenario: Scenario, model: Model, start: float) -> ShapedChannels | 
                 g.seat_factors,
             )
         )
-        for each in scenario.track.settlements
+        for each in (scenario.track.settlements if g.dead is None else ())
     ]
-    return ShapedChannels(RailShapes(scenario.track.rail_shapes, settled), start + train.wheelset_x, train.wheel_radius)
+    laid = [] if g.dead is None else [LaidRail(g.dead, side) for side in range(2)]
+    rails = RailShapes(scenario.track.rail_shapes, settled, laid)
+    return ShapedChannels(rails, start + train.wheelset_x, train.wheel_radius)
 
 
 def _started(scenario: Scenario, model: Model) -> State:

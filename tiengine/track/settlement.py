@@ -19,7 +19,8 @@ class Settlement(Params):
     """A settlement of the ground under the slabs, or a heave; it is symmetrical about its middle.
 
     `cosine` is one wave depth (1 + cos)/2; `angles` are two straight ramps that meet in the middle, as where a pier has
-    sunk between its neighbours. Slabs and rails follow with their stiffness; the bed transmits tension.
+    sunk between its neighbours. Slabs and rails follow with their stiffness; on a
+    bed that transmits no tension slabs may bridge a part of it and leave a gap.
     """
 
     kind: Annotated[Literal["cosine", "angles"], Field(description="shape")]
@@ -45,23 +46,17 @@ def ground_shape(settlement: Settlement, x: Reals) -> Reals:
     return settlement.depth * form
 
 
-def check_settlements(settlements: Sequence[Settlement], *, begin: float, end: float, no_tension: bool) -> None:
-    """Refuse settlements that no wheel reaches, and a bed that would leave a gap under them.
+def check_settlements(settlements: Sequence[Settlement], *, begin: float, end: float) -> None:
+    """Refuse settlements that no wheel reaches.
 
     Args:
         settlements: Entries of the scenario.
         begin: Chainage of the leading wheel at the start [m].
         end: Its chainage at the end of the run [m].
-        no_tension: Whether the bed transmits no tension.
 
     Raises:
         InputError: Names the entry, its value and the rule.
     """
-    if settlements and no_tension:
-        raise InputError(
-            "track.settlements: must be left out with a bed that transmits no tension (mortar_no_tension); gaps between"
-            " slab and settled ground are not modelled"
-        )
     for i, each in enumerate(settlements):
         rear, front = each.reach
         if front <= begin or rear >= end:

@@ -39,7 +39,7 @@ from tiengine.track.fastening import POINT
 from tiengine.track.mortar import GAUSS, Mortar
 from tiengine.track.plate_shapes import WX, WXX, WY, WYY, W, element_dofs, locate, shapes_at, tabulate_shapes
 from tiengine.track.slab import Slab
-from tiengine.track.slab_matrices import SlabMatrices, seat_shapes
+from tiengine.track.slab_matrices import SlabMatrices, bed_points, seat_shapes
 
 __all__ = [
     "GAUSS_POINTS", "MomentTable", "fine_mesh", "moment_rows", "moment_table", "moments_of_motion",
@@ -196,11 +196,7 @@ def pressures_felt(design: SlabMatrices) -> Reals:
     Args:
         design: Matrices of the slab.
     """
-    elements, points = design.bed_factor.shape
-    shapes = np.zeros((design.n, elements, points))
-    for e, index in enumerate(design.bed_index):
-        shapes[index, e] = design.bed_shape.T
-    return (shapes * design.bed_factor).reshape(design.n, -1)
+    return bed_points(design) * design.bed_factor.ravel()
 
 
 def _of_free_plate(slab: Slab, K: sp.csr_array, M: sp.csr_array, loads: Reals) -> Reals:
