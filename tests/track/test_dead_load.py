@@ -45,13 +45,13 @@ def carried(track: tuple[TrackParts, SlabMatrices], pressure: np.ndarray) -> np.
 
 
 def dead_weight(parts: TrackParts) -> float:
-    """Of a slab and the rails on it [N]."""
+    """Weight of a slab and the rails on it [N]."""
     return (parts.slab.mass + 2.0 * parts.rail.densities[0] * parts.slab.pitch) * GRAVITY
 
 
 @pytest.mark.parametrize("gradient", [0.0, 45.0, -45.0, 90.0])
 def test_the_pressure_carries_slab_and_rail(track, gradient: float) -> None:
-    """Of warped slabs in a row the middle one's pressure is its own weight and its rails': they share by symmetry."""
+    """The middle one of warped slabs in a row carries its own weight and its rails': they share by symmetry."""
     warped = replace(sound(track), curvature=1e-5 * gradient)
     found = resting_track(track[0], [warped] * 7)
     # the rails' ends, three slabs away, are pinned: 1e-4 where long lifted slabs lean on each other

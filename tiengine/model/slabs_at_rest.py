@@ -51,7 +51,7 @@ class _Slabs:
             self._seats.update(range(row.seats[0] // per_slab, row.seats[1] // per_slab + 1))
 
     def kind(self, slab: int) -> Hashable:
-        """What tells slabs of one kind from others; None for a sound one."""
+        """Distinguish slabs of one kind from others; None for a sound one."""
         seats: tuple[bytes, ...] = ()
         if slab in self._seats:
             factors, plays = self._seats_of(slab)

@@ -41,7 +41,7 @@ SAMPLES = 0.05  # m
 
 @dataclass(frozen=True)
 class TrackParts:
-    """What all slabs of a track share.
+    """Parts that all slabs of a track share.
 
     Attributes:
         rail: Section of the rails.

@@ -36,7 +36,7 @@ class SlabsAsTheyAre(Protocol):
     """The slabs of a track by their index."""
 
     def kind(self, slab: int) -> Hashable:
-        """What tells slabs of one kind from others; None for a sound one."""
+        """Distinguish slabs of one kind from others; None for a sound one."""
 
     def resting(self, slab: int | None) -> RestingSlab:
         """The slab; None for a sound one."""

@@ -46,7 +46,7 @@ class Mortar(Params):
 
 
 def sound_with_gap(table: Any) -> Any:
-    """What lies beyond a gap is sound unless a factor is given.
+    """Take what lies beyond a gap as sound unless a factor is given.
 
     Args:
         table: Keys of a void or of fastenings, before they are checked.
