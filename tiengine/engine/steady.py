@@ -12,7 +12,6 @@ from tiengine.engine.state import State
 from tiengine.engine.static_track import StaticTrack
 from tiengine.kernels import layout as at
 from tiengine.model.constant_data import Model
-from tiengine.model.ingredients import Ingredients
 from tiengine.model.sine_model import SineModel
 from tiengine.parameters.arrays import Flags, Reals
 from tiengine.track.steady_track import RIGID_GROUND, SeatsInWindow, SteadyTrack, track_stiffness
@@ -141,12 +140,6 @@ def _seats(model: Model, state: State, first_seat_s: float) -> SeatsInWindow:
         s=s[j],
         slab=np.where(modelled, slab - state.first_slab, RIGID_GROUND),
         seat=seat,
-        scale=_bound_factors(g, state.first_seat)[j],
+        scale=g.bound_factors(state.first_seat, g.seats)[j],
         length=g.fastening.length,
     )
-
-
-def _bound_factors(g: Ingredients, first: int) -> Reals:
-    """Factors of the window's fastenings, 0 of those that hang: they carry when the train comes, shape (seats, 2)."""
-    factors = g.seat_factors(first, g.seats)
-    return factors if g.seat_plays is None else np.where(g.seat_plays(first, g.seats) > 0.0, 0.0, factors)

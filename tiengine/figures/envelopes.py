@@ -47,15 +47,18 @@ def draw(train: Train) -> Figure:
     if enlarged:
         above, below = figure.subfigures(2, 1, height_ratios=(1.0, 2.4), squeeze=False)[:, 0]
         _enlarge(above, enlarged)
-    axes = below.subplots(4, 1, sharex=True)
+    lifts = "largest_opening" in slabs.values and bool(slabs["largest_opening"].any())
+    axes = below.subplots(5 if lifts else 4, 1, sharex=True)
     _vertical(axes[0], seats)
     _lateral(axes[1], seats)
     _pressure(axes[2], slabs)
     _moments(axes[3], slabs)
+    if lifts:
+        _openings(axes[4], slabs)
     for panel in axes:
         _mark(panel, seats, slabs)
         panel.margins(x=0.0)
-    axes[3].set_xlabel("chainage [m]")
+    axes[-1].set_xlabel("chainage [m]")
     handles = dict(zip(*reversed(axes[0].get_legend_handles_labels()), strict=True))
     below.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3 if len(handles) > 5 else 5)
     return figure
@@ -108,6 +111,17 @@ def _moments(axes: Axes, slabs: Extremes) -> None:
         _line(axes, slabs, slabs[f"smallest_moment_{direction}"], dashed, 1e-3, drawstyle="steps-mid")
     title = "Slabs: largest bending moment; dashed: smallest; grey: along the track, black: across"
     axes.set(ylabel="[kN m/m]", title=title)
+
+
+def _openings(axes: Axes, slabs: Extremes) -> None:
+    for name, look in (
+        ("opening_at_rest", Look("0.6", "-")),
+        ("largest_opening", Look(BLACK, "-")),
+        ("smallest_opening", Look(BLACK, "--")),
+    ):
+        _line(axes, slabs, slabs[name], look, 1e3, drawstyle="steps-mid")
+    title = "Opening under slabs: largest; grey: largest at rest; dashed: smallest there, 0 where it closes"
+    axes.set(ylabel="[mm]", title=title)
 
 
 def _mark(axes: Axes, seats: Extremes, slabs: Extremes) -> None:

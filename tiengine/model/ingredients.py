@@ -103,6 +103,16 @@ class Ingredients:
     seat_plays: Callable[[int, int], Reals] | None = None
     dead: DeadState | None = None
 
+    def bound_factors(self, first: int, count: int) -> Reals:
+        """Factors of consecutive fastenings, 0 of those that hang: they carry nothing at rest, shape (count, 2).
+
+        Args:
+            first: Index of the first seat.
+            count: Number of seats.
+        """
+        factors = self.seat_factors(first, count)
+        return factors if self.seat_plays is None else np.where(self.seat_plays(first, count) > 0.0, 0.0, factors)
+
     def hanging_seats(self, first: int) -> tuple[Reals, Reals]:
         """Play of the window's seats and their springs at rest, k_v g and k_v u [N], shape (seats, 2) each; 0 if sound.
 

@@ -29,7 +29,7 @@ def slabs_at_rest(scenario: Scenario, designs: SlabDesigns) -> DeadState | None:
         designs: Its slabs.
     """
     parts = scenario.parts
-    if not parts.mortar.no_tension or scenario.numerics.trial_functions == "sines":
+    if not scenario.slabs_may_lift:
         return None
     end = scenario.rear + scenario.train.distance + scenario.window_length
     count = int(np.floor(end / parts.slab.pitch)) + 2

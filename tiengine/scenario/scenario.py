@@ -92,6 +92,11 @@ class Scenario(Params):
         """Parts that the scenario refers to, built and checked once."""
         return build_parts(self.train, self.track, self.wind, self.presets)
 
+    @property
+    def slabs_may_lift(self) -> bool:
+        """Whether slabs may lift off their bed with rails that follow: a bed without tension, rails in splines."""
+        return self.parts.mortar.no_tension and self.numerics.trial_functions == "splines"
+
     @cached_property
     def window_length(self) -> float:
         """Length of the moving window [m]."""

@@ -135,7 +135,7 @@ class Run:
         tracks = [make_irregularity(track, lead, f) for track, f in zip_longest(task.tracks, task.functions)]
         start = scenario.rear + ingredients.centre_s
         check_reach(tracks, start + scenario.train.distance + float(ingredients.train.wheelset_x.max()))
-        guard = Guard.watching(stepper, scenario.events, np.array([track.end for track in tracks]))
+        guard = Guard.watching(stepper, scenario.events, np.array([track.end for track in tracks]), scenario.track)
         places = list(range(len(task.trains)))
         steps = np.zeros(len(places), np.int64)
         shapes = _shapes(scenario, model, start)
