@@ -15,7 +15,7 @@ from tiengine.track.dead_state import DeadState, dead_state
 from tiengine.track.defects import fastening_factors, fastening_plays
 from tiengine.track.mortar import GAUSS, MortarVoid, bed_gaps
 from tiengine.track.settlement import ground_shape
-from tiengine.track.slab_moments import places
+from tiengine.track.slab_moments import bed_places
 from tiengine.track.slab_warp import curvature_of
 
 __all__ = ["slabs_at_rest"]
@@ -99,6 +99,4 @@ class _Slabs:
     @cached_property
     def _along(self) -> Reals:
         """Quadrature points of a slab from its middle [m], shape (n_el, n_q)."""
-        node = np.polynomial.legendre.leggauss(GAUSS)[0]
-        local = np.stack(np.meshgrid(node, node, indexing="ij"), axis=-1).reshape(-1, 2)
-        return places(self._parts.slab, local)[0].reshape(-1, GAUSS**2)
+        return bed_places(self._parts.slab)[0].reshape(-1, GAUSS**2)

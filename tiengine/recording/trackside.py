@@ -159,6 +159,8 @@ def _gauge_group(gauge: Gauge, slab: Slab) -> GroupSpec:
         seat = nearest_seat(gauge.chainage, slab)
         known = {"on": gauge.on, "chainage": (seat + 0.5) * slab.fastening_pitch, "seat": seat, "side": gauge.side}
         return GroupSpec.gauge("force", known)
+    if gauge.on == "gap":
+        return GroupSpec.gauge("opening", {"on": gauge.on, "chainage": gauge.chainage, "y": gauge.y})
     where = {"side": gauge.side} if gauge.on == "rail" else {"y": gauge.y}
     return GroupSpec.gauge("motion", {"on": gauge.on, "chainage": gauge.chainage, **where})
 

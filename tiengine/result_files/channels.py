@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 __all__ = [
-    "BODY", "DEFLECTION", "DIRECTIONS", "DOFS", "GAUGE_FORCE", "GAUGE_MOTION", "GROUPS", "IRREGULARITY", "MORTAR",
-    "OPENINGS", "PATCH", "SEATS", "SLABS", "WHEEL", "Channel",
+    "BODY", "DEFLECTION", "DIRECTIONS", "DOFS", "GAUGE_FORCE", "GAUGE_MOTION", "GAUGE_OPENING", "GROUPS",
+    "IRREGULARITY", "MORTAR", "OPENINGS", "PATCH", "SEATS", "SLABS", "WHEEL", "Channel",
 ]  # fmt: skip
 
 
@@ -137,6 +137,9 @@ GAUGE_FORCE = {
     "lateral_force": Channel("N", "lateral force of the rail on the fastening, positive to the right"),
 }
 """Channels of a gauge on a fastening."""
+
+GAUGE_OPENING = {"opening": Channel("m", "opening between slab and bed, 0 in contact; NaN over a void without bed")}
+"""Channel of a gauge in a gap."""
 
 GROUPS = {
     "wheel": WHEEL,

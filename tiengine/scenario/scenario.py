@@ -273,7 +273,11 @@ def _check(scenario: Scenario) -> None:
     last_slab = int((scenario.rear + scenario.train.distance + window) / parts.slab.pitch)
     check_slab_warps(scenario.track.slab_warps, last_slab)
     check_gauges(
-        scenario.gauges, begin=scenario.rear, end=scenario.rear + scenario.train.distance + window, slab=parts.slab
+        scenario.gauges,
+        begin=scenario.rear,
+        end=scenario.rear + scenario.train.distance + window,
+        slab=parts.slab,
+        slabs_may_lift=scenario.slabs_may_lift,
     )
 
 

@@ -42,7 +42,7 @@ from tiengine.track.slab import Slab
 from tiengine.track.slab_matrices import SlabMatrices, bed_points, seat_shapes
 
 __all__ = [
-    "GAUSS_POINTS", "MomentTable", "fine_mesh", "moment_rows", "moment_table", "moments_of_motion",
+    "GAUSS_POINTS", "MomentTable", "bed_places", "fine_mesh", "moment_rows", "moment_table", "moments_of_motion",
     "moments_of_pressure", "nodes", "places", "plate_matrices", "pressures_felt",
 ]  # fmt: skip
 
@@ -275,6 +275,15 @@ def _interpolation(slab: Slab, fine: Slab) -> sp.csr_array:
     column = np.repeat(index, 3, axis=0)
     values = table[:, [W, WX, WY]]
     return sp.csr_array((values.ravel(), (row, column.ravel())), shape=(fine.plate_dofs, slab.plate_dofs + 2))
+
+
+def bed_places(slab: Slab) -> tuple[Reals, Reals]:
+    """Coordinates of the bed's quadrature points, from the slab's centre [m], shape (points,) each.
+
+    Args:
+        slab: The slab with its mesh.
+    """
+    return places(slab, _quadrature(slab)[0])
 
 
 def plate_matrices(slab: Slab) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
