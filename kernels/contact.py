@@ -32,18 +32,19 @@ def solve6(matrix_out: Template, x_out: Template):
 
     ``x_out`` holds the right-hand side before and the solution after; the matrix is overwritten.
     """
-    for k in range(6):
-        inverse = 1.0 / matrix_out[k, k]
-        for i in range(k + 1, 6):
-            factor = matrix_out[i, k] * inverse
-            for j in range(k + 1, 6):
+    inverse = ti.Vector.zero(ti.f64, 6)
+    for k in ti.static(range(6)):
+        inverse[k] = 1.0 / matrix_out[k, k]
+        for i in ti.static(range(k + 1, 6)):
+            factor = matrix_out[i, k] * inverse[k]
+            for j in ti.static(range(k + 1, 6)):
                 matrix_out[i, j] -= factor * matrix_out[k, j]
             x_out[i] -= factor * x_out[k]
-    for m in range(6):
-        k = 5 - m
-        for j in range(k + 1, 6):
+    for m in ti.static(range(6)):
+        k = ti.static(5 - m)
+        for j in ti.static(range(k + 1, 6)):
             x_out[k] -= matrix_out[k, j] * x_out[j]
-        x_out[k] /= matrix_out[k, k]
+        x_out[k] *= inverse[k]
 
 
 @ti.func

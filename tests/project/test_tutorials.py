@@ -34,7 +34,7 @@ SHORTER = {
         "distance = 60.0": "distance = 26.0",
         "taper = 10.0": "taper = 5.0",
         "run_in = 15.0": "run_in = 1.0",
-        '"train.distance": 25.0': '"train.distance": 8.0',
+        '"train.distance": 25.0': '"train.distance": 17.0',
     },
     "own_profiles": {"distance = 150.0": "distance = 5.0"},
     "hundred_trains": {

@@ -30,6 +30,7 @@ def largest_difference(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a - b).max())
 
 
+@pytest.mark.slow
 def test_seats_that_hang_by_nothing_are_sound_and_by_much_have_failed() -> None:
     sound, failed = normal_forces(), normal_forces(SEATS.format("factor=0.0"))
     np.testing.assert_array_equal(normal_forces(SEATS.format("gap=0.0")), sound)
@@ -39,6 +40,7 @@ def test_seats_that_hang_by_nothing_are_sound_and_by_much_have_failed() -> None:
     assert 1e3 < largest_difference(half, sound) < 0.5 * largest_difference(failed, sound)
 
 
+@pytest.mark.slow
 def test_a_bed_with_a_gap_of_nothing_is_sound_and_with_a_huge_one_a_void() -> None:
     """An open bed is explicit, a void is not in the implicit block at all: 3e-4 of N apart, the passes' error."""
     sound, void = normal_forces(), normal_forces(VOID.format("factor=0.0"))
@@ -56,9 +58,10 @@ def test_the_start_is_in_equilibrium_on_warped_slabs() -> None:
     assert np.ptp(warped[300:]) > 2.0 * np.ptp(normal_forces()[300:])
 
 
+@pytest.mark.slow
 def test_a_settlement_on_a_bed_without_tension() -> None:
     """2 mm over 8 m, which slabs bridge in part until the wheels press them down: other forces, of the same order."""
-    ground = "track.settlements=[{kind='cosine', at=80, length=8, depth=0.002}]"
+    ground = "track.ground=[{kind='cosine', at=80, length=8, depth=0.002}]"
     bridged, pulled = normal_forces(ground), normal_forces(ground, "track.mortar_no_tension=false")
     assert 1e3 < largest_difference(bridged, pulled) < np.ptp(pulled)
     assert np.ptp(bridged) == pytest.approx(np.ptp(pulled), rel=0.3)

@@ -43,7 +43,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         effort=asked.effort,
         couplings=parts.couplings,
     )
-    if scenario.track.line is not None or scenario.wind.speed is not None or asked.forces:
+    moving = scenario.track.base_motion.file is not None
+    if scenario.track.line is not None or scenario.wind.speed is not None or asked.forces or moving:
         train = replace(train, K=train.K + train.K_leaning)
     designs = _designs(scenario)
     dead = slabs_at_rest(scenario, designs)
@@ -68,7 +69,7 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         absorbing_zone=numerics.absorbing_zone,
         explicit_mortar=numerics.mortar == "explicit",
         given=given_sources(scenario, train),
-        shaped=bool(shapes or scenario.track.rail_shapes or scenario.track.settlements or (dead and dead.uneven)),
+        shaped=bool(shapes or scenario.track.rail_shapes or scenario.track.ground or (dead and dead.uneven)),
         out_of_round=wheel_tables(shapes, parts.wheel_radii) if shapes else None,
         seat_plays=_seat_plays(scenario),
         dead=dead,

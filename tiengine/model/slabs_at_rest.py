@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from tiengine.irregularity.ground import Ground, ground_shape, reach_of
 from tiengine.model.ingredients import SlabDesigns
 from tiengine.parameters.arrays import Reals
 from tiengine.scenario.scenario import Scenario
@@ -14,7 +15,6 @@ from tiengine.track.dead_load import RestingSlab, TrackParts
 from tiengine.track.dead_state import DeadState, dead_state
 from tiengine.track.defects import fastening_factors, fastening_plays
 from tiengine.track.mortar import GAUSS, MortarVoid, bed_gaps
-from tiengine.track.settlement import ground_shape
 from tiengine.track.slab_moments import bed_places
 from tiengine.track.slab_warp import curvature_of
 
@@ -63,7 +63,7 @@ class _Slabs:
             if each.gap or each.factor != 1.0
         )
         curvature, low = curvature_of(self._track.slab_warps, slab), self._ground(slab)
-        kind = (seats, voids, curvature, slab if low.any() else None)
+        kind = (seats, voids, curvature, low.tobytes() if low.any() else None)
         return kind if seats or voids or curvature or low.any() else None
 
     def resting(self, slab: int | None) -> RestingSlab:
@@ -90,11 +90,15 @@ class _Slabs:
         """Displacement of the ground at a slab's quadrature points [m], shape (n_el, n_q)."""
         middle = (slab + 0.5) * self._parts.slab.pitch
         low = np.zeros_like(self._along)
-        for each in self._track.settlements:
-            rear, front = each.reach
-            if rear < middle + 0.5 * self._parts.slab.pitch and front > middle - 0.5 * self._parts.slab.pitch:
+        for each, rear in self._ground_from:
+            if rear < middle + 0.5 * self._parts.slab.pitch:
                 low += ground_shape(each, middle + self._along)
         return low
+
+    @cached_property
+    def _ground_from(self) -> list[tuple[Ground, float]]:
+        """Displacements of the ground and the chainages where they begin [m]."""
+        return [(each, reach_of(each)[0]) for each in self._track.ground]
 
     @cached_property
     def _along(self) -> Reals:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
+from tiengine.engine.lookout import Lookout
 from tiengine.engine.state import PARTS
 from tiengine.engine.stepper import Plan, Stepper
 from tiengine.kernels import layout as at
@@ -89,6 +90,7 @@ class Guard:
         gaps: Gaps that may close; None if there are none.
         found: Events since they were last taken, by place of the train.
         stopped: Number of the step in which a train was stopped, by its place.
+        called: Whether the stepper looks at the state itself and calls for a check where it is needed.
     """
 
     stepper: Stepper
@@ -98,6 +100,7 @@ class Guard:
     gaps: GapWatch | None = None
     found: dict[int, list[Event]] = field(default_factory=dict)
     stopped: dict[int, int] = field(default_factory=dict)
+    called: bool = False
 
     @classmethod
     def watching(
@@ -116,6 +119,7 @@ class Guard:
         watched = gaps if gaps is not None and gaps.count else None
         watch = Watch.fresh(trains, wheelsets, 0 if watched is None else watched.count)
         guard = cls(stepper, policy, track_end, watch, watched)
+        guard.called = stepper.look_out(guard.lookout)
         stepper.watch("guards", guard.watch_step, due=guard.due)
         return guard
 
@@ -125,6 +129,7 @@ class Guard:
         self._dt, self._train = ingredients.newmark.dt, ingredients.train
         self._done, self._position = 0, np.zeros(0)
         self._flying = True  # until checked: a checkpoint may have brought wheels in flight
+        self._checked = -1
         self.every = max(int(EVERY / self._dt + 1e-9), 1)
         self._look_every = StepOscillation.interval(self._dt)
         self._shift, self._normal = self.state.relative_shift, self.state.normal_force
@@ -136,6 +141,9 @@ class Guard:
         self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
         self._wheel_front = float(self._train.wheelset_x.max())
         self._nearest_end = float(self.track_end.min())
+        squares = [limit * limit for limit in LIMITS]
+        limits = np.array([*squares, self._climb, self._steepest_tilt, self._innermost])
+        self.lookout = Lookout(self.every, limits, self.check_row)
 
     def load(self, done: int, position: NDArray[np.float64]) -> None:
         """Take the numbers and places of the coming steps.
@@ -145,6 +153,18 @@ class Guard:
             position: Chainage of the first vehicle's centre at the end of each [m], shape (steps,).
         """
         self._done, self._position = done, position
+        self.lookout.steps_before = done
+        self._set_always()
+
+    def _set_always(self) -> None:
+        """Let a check follow every look while wheels fly, gaps may close, or a measured track may end in this chunk."""
+        ends = bool(self._position[-1:].max(initial=-np.inf) + self._wheel_front > self._nearest_end)
+        self.lookout.always = self._flying or ends or self.gaps is not None
+
+    def check_row(self, i: int) -> None:
+        """Check the state after the step in row ``i`` of the chunk."""
+        self.check(self._done + i + 1, float(self._position[i]))
+        self._set_always()
 
     def watch_step(self) -> None:
         """Check at the end of a step if it is time to, and after the last of a chunk."""
@@ -152,14 +172,14 @@ class Guard:
         step, position = self._done + i + 1, float(self._position[i])
         if (i + 1) % self._look_every == 0:
             self._oscillates(i, step * self._dt, position)
-        if step % self.every == 0 or i + 1 == len(self._position):
+        if (step % self.every == 0 or i + 1 == len(self._position)) and step != self._checked:
             self.check(step, position)
 
     def due(self, plan: Plan) -> Flags:
         """Steps after which the state is checked, or the forces of the last ones are looked at."""
-        checked = (self._done + plan.step + 1) % self.every == 0
-        looked = (plan.step + 1) % self._look_every == 0
-        due: Flags = checked | looked | (plan.step + 1 == len(self._position))
+        due: Flags = ((plan.step + 1) % self._look_every == 0) | (plan.step + 1 == len(self._position))
+        if not self.called:
+            due |= (self._done + plan.step + 1) % self.every == 0
         return due
 
     def check(self, step: int, position: float) -> None:
@@ -169,7 +189,7 @@ class Guard:
             step: Its number, from 1.
             position: Chainage of the first vehicle's centre [m].
         """
-        time = step * self._dt
+        time, self._checked = step * self._dt, step
         squares = zip(self.state.squares(), LIMITS, strict=True)
         if not all(square < limit * limit for square, limit in squares):  # not a number is not less, either
             self._runaway(step, time, position)

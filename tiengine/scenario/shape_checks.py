@@ -1,12 +1,12 @@
-"""Checks of the shapes of rails and wheels against a run."""
+"""Checks of the shapes of rails, wheels and ground against a run."""
 
 from __future__ import annotations
 
+from tiengine.irregularity.ground import check_ground
 from tiengine.irregularity.rail_shapes import check_rail_shapes
 from tiengine.irregularity.wheel_shapes import check_wheel_shapes
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.tables import Numerics, Track, Train
-from tiengine.track.settlement import check_settlements
 
 __all__ = ["check_shapes"]
 
@@ -28,12 +28,13 @@ def check_shapes(
         InputError: Names the key, its value and the rule.
     """
     check_rail_shapes(track.rail_shapes, begin=begin, end=begin + train.distance)
-    check_settlements(track.settlements, begin=begin, end=begin + train.distance)
+    check_ground(track.ground, begin=begin, end=begin + train.distance)
     check_wheel_shapes(train.wheel_shapes, wheelsets)
     _check_gaps(track, numerics, no_tension)
     for key, given in (
         ("track.rail_shapes", track.rail_shapes),
-        ("track.settlements", track.settlements),
+        ("track.ground", track.ground),
+        ("track.base_motion", track.base_motion.file),
         ("train.wheel_shapes", train.wheel_shapes),
     ):
         if given and numerics.trial_functions == "sines":

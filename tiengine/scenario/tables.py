@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from tiengine.irregularity.base_motion import BaseMotion
+from tiengine.irregularity.ground import Ground
 from tiengine.irregularity.rail_shapes import RailShape
 from tiengine.irregularity.wheel_shapes import WheelShape
 from tiengine.parameters.quantity import Params, Q
@@ -22,7 +24,6 @@ from tiengine.track.alignment_file import MOST_ROWS
 from tiengine.track.defects import FailedFastenings
 from tiengine.track.knots import Grading
 from tiengine.track.mortar import MortarVoid
-from tiengine.track.settlement import Settlement
 from tiengine.track.slab_warp import SlabWarp
 from tiengine.vehicle.assembly import Effort
 from tiengine.vehicle.force_history import BodyForce
@@ -148,8 +149,8 @@ class Track(Params):
         tuple[MortarVoid, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
     rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
-
-    settlements: Annotated[tuple[Settlement, ...], Field(description="tables, see below", max_length=1000)] = ()
+    base_motion: Annotated[BaseMotion, Field(description="table, see below")] = BaseMotion()
+    ground: Annotated[tuple[Ground, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
     slab_warps: Annotated[tuple[SlabWarp, ...], Field(description="tables, see below", max_length=1000)] = ()
 
     @property

@@ -28,9 +28,12 @@ baseplate the moment below them is that of an element of the fine mesh and means
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
+from threadpoolctl import threadpool_limits
 
 from tiengine.kernels import plate
 from tiengine.parameters.arrays import Reals
@@ -108,6 +111,7 @@ class MomentTable:
         self.places, self.matrix = where, matrix
 
 
+@lru_cache(maxsize=4)  # a task asks again for the table of the last one
 def moment_table(
     slab: Slab, mortar: Mortar | None, baseplate: tuple[float, float] = POINT, fine: Slab | None = None
 ) -> MomentTable:
@@ -119,7 +123,12 @@ def moment_table(
         baseplate: Rectangle on which a seat presses, along and across [m].
         fine: The slab with the fine mesh, if not that of :func:`fine_mesh`.
     """
-    fine = fine or fine_mesh(slab)
+    with threadpool_limits(1):  # the same bits for whoever asks first
+        return _moment_table(slab, mortar, baseplate, fine or fine_mesh(slab))
+
+
+def _moment_table(slab: Slab, mortar: Mortar | None, baseplate: tuple[float, float], fine: Slab) -> MomentTable:
+    """The same on one thread."""
     K, M, B = plate_matrices(fine)
     along, across = np.arange(1 - slab.fastenings, slab.fastenings) / 2.0, np.array([-1.0, 0.0, 1.0])
     grid = np.meshgrid(slab.fastening_pitch * along, slab.seat_half_spacing * across, indexing="ij")
