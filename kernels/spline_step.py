@@ -68,7 +68,7 @@ def sweep_slabs(
             slabs.clear_loads(slab, base, dofs)
 
 
-def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, moving: int, hanging: int) -> Any:
+def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, moving: int, own: int, hanging: int) -> Any:
     """Make the kernel.
 
     Args:
@@ -78,6 +78,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, movi
         patches: Patches a wheel.
         shaped: 1 if rails have shapes or wheels are out of round.
         moving: 1 if the ground moves in time.
+        own: 1 if wheels have radii and contact tables of their own.
         hanging: 1 if some seats hang.
     """
     lane_vectors = ti.types.ndarray(dtype=ti.types.vector(lanes, ti.f64), ndim=1)
@@ -242,7 +243,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, movi
                             b, c, 2 * (b - b0), step, V, tolerance, row, dims, constants, wheel_place,
                             wheelset_place, car_columns_start, car_columns, wheel, table, irregularity,
                             wheelset_compliance, coupling, contact, force, wheelset_force, rail_force, iterations,
-                            wheel_record, car, under, car_load, size, blocks, patches, shaped,
+                            wheel_record, car, under, car_load, size, blocks, patches, shaped, own,
                         )  # fmt: skip
                     wheels.add_wheel_columns(c, first, dims, wheel_place, wheel_rows, rail, under)
                 if stages & at.BACKWARD_STAGE:

@@ -153,6 +153,7 @@ def mortar_forces(
 def forces_and_contact(
     parallel: Template,
     patches: Template,
+    own: Template,
     tick: Ints1,
     rows: Ints1,
     dims: Ints1,
@@ -241,7 +242,7 @@ def forces_and_contact(
                 count = pt.solve_wheelset(
                     b, w, V, x, dx, left, right, channels, dims, constants, wheel, table, wheelset_compliance,
                     rail_coupling, contact, force, wheelset_force, rail_force, tolerance,
-                    patches,
+                    patches, own,
                 )  # fmt: skip
                 uw.add_wheelset_force(b, w, 1.0, dims, wheelset_dof, wheelset_force, motion)
                 iterations_out[b, w] = ti.max(iterations_out[b, w], count)

@@ -19,6 +19,10 @@ from tiengine.kernels.types import Array, Template
     N_CONTACT,
 ) = range(20)  # fmt: skip
 
+# Size of a wheel: r0 and b0 of its wheelset; where wheels or rails differ also its own radius, how much larger that is
+# than its table's, the crown offset of its rail, the first row of its table.
+OF_WHEELSET, WHEEL_RADIUS, LARGER, CROWN, FIRST_ROW, OF_WHEEL = 2, 2, 3, 4, 5, 6
+
 THIRD_OF_EXPONENTS = 715094163 << 32
 """Two thirds of the bias of a double's exponent, less what makes the first cube root's error least."""
 
@@ -44,11 +48,32 @@ def catmull_rom(f: float):
 
 
 @ti.func
-def lookup(u: float, alpha: float, table: Array, constants: Array, patch: Template):
-    """All columns of a patch of the contact table at (u, alpha); outside the table its edge values are kept."""
+def size_of(wheelset: int, side: int, wheel: Array, own: Template):
+    """Size of a wheel; the longer vector, which the functions below recognise, if ``own`` = 1."""
+    if ti.static(own == 1):
+        return ti.Vector(
+            [
+                wheel[wheelset, at.NOMINAL_RADIUS],
+                wheel[wheelset, at.HALF_SPACING],
+                wheel[wheelset, at.RADIUS_LEFT + side],
+                wheel[wheelset, at.LARGER_LEFT + side],
+                wheel[wheelset, at.CROWN_LEFT + side],
+                wheel[wheelset, at.ROW_LEFT + side],
+            ]
+        )
+    else:
+        return ti.Vector([wheel[wheelset, at.NOMINAL_RADIUS], wheel[wheelset, at.HALF_SPACING]])
+
+
+@ti.func
+def lookup(u: float, alpha: float, table: Array, constants: Array, patch: Template, size: Template):
+    """All columns of a patch of a wheel's contact table at (u, alpha); outside the table its edge values are kept."""
+    first, rows = 0, table.shape[0]
+    if ti.static(size.get_shape()[0] == OF_WHEEL):
+        first, rows = ti.cast(size[FIRST_ROW], ti.i32), ti.cast(constants[at.TABLE_ROWS], ti.i32)
     x = (u - constants[at.TABLE_U0]) / constants[at.TABLE_DU]
     y = (alpha - constants[at.TABLE_ALPHA0]) / constants[at.TABLE_DALPHA]
-    i = ti.min(ti.max(ti.cast(ti.floor(x), ti.i32), 1), table.shape[0] - 3)
+    i = ti.min(ti.max(ti.cast(ti.floor(x), ti.i32), 1), rows - 3)
     j = ti.min(ti.max(ti.cast(ti.floor(y), ti.i32), 1), table.shape[1] - 3)
     wx = catmull_rom(ti.min(ti.max(x - i, 0.0), 1.0))
     wy = catmull_rom(ti.min(ti.max(y - j, 0.0), 1.0))
@@ -57,7 +82,7 @@ def lookup(u: float, alpha: float, table: Array, constants: Array, patch: Templa
         for n in range(4):
             weight = wx[m] * wy[n]
             for column in ti.static(range(at.N_TABLE)):
-                value[column] += weight * table[i + m - 1, j + n - 1, patch * at.N_TABLE + column]
+                value[column] += weight * table[first + i + m - 1, j + n - 1, patch * at.N_TABLE + column]
     return value
 
 
@@ -78,8 +103,7 @@ def sine_and_cosine(x: float):
 def contact_state(
     sigma: float,
     V: float,
-    r0: float,
-    b0: float,
+    size: Template,
     x: Template,
     dx: Template,
     rail: Template,
@@ -96,8 +120,7 @@ def contact_state(
     Args:
         sigma: Side.
         V: Speed [m/s].
-        r0: Nominal rolling radius [m].
-        b0: Half spacing of the tape circles [m].
+        size: Of the wheel, see :func:`size_of`.
         x: Wheelset y, z, roll, pitch, yaw [m, rad].
         dx: Its rates.
         rail: w, v, theta_x of the rail under the wheel [m, m, rad].
@@ -105,11 +128,15 @@ def contact_state(
         rail_rate: Their rates at constant s.
         irregularity: Track channels at the wheelset, N_IRREGULARITY of them or, with shapes, N_FELT, see ``layout``.
         rolls: 1 if a cross level turns the railheads.
-        table: Contact geometry, shape (n_u, n_alpha, N_TABLE patches).
+        table: Contact geometry, shape (tables n_u, n_alpha, N_TABLE patches).
         constants: Numbers, see ``layout``.
         patch: Slot of the table, 0 or 1.
     """
     h_r, b_i, y_r = constants[at.ARM_HEAD], constants[at.IRREGULARITY_HALF_BASE], constants[at.CROWN_OFFSET]
+    r0, b0 = size[0], size[1]
+    radius = r0  # of the wheel itself; r0 belongs to the wheelset's spin
+    if ti.static(size.get_shape()[0] == OF_WHEEL):
+        radius, y_r = size[WHEEL_RADIUS], size[CROWN]
     w, v, theta_x = rail[0], rail[1], rail[2]
     turn = irregularity[at.CROSS_LEVEL] * rolls
     turn_slope = irregularity[at.CROSS_LEVEL_SLOPE] * rolls
@@ -123,16 +150,18 @@ def contact_state(
         z_slope += of_left * irregularity[at.RAIL_LEFT_SLOPE] + of_right * irregularity[at.RAIL_RIGHT_SLOPE]
         z_slope -= of_left * irregularity[at.WHEEL_LEFT_SLOPE] + of_right * irregularity[at.WHEEL_RIGHT_SLOPE]
 
-    u = sigma * ((x[0] - r0 * x[2]) - (v + h_r * theta_x + y_irr))
+    u = sigma * ((x[0] - radius * x[2]) - (v + h_r * theta_x + y_irr))
     alpha = sigma * (x[2] - theta_x - turn)
-    g = lookup(u, alpha, table, constants, patch)
+    g = lookup(u, alpha, table, constants, patch, size)
     cos_gamma = 1.0 / ti.sqrt(1.0 + g[at.TAN_GAMMA] * g[at.TAN_GAMMA])
     sin_gamma = g[at.TAN_GAMMA] * cos_gamma
     sin_turn, cos_turn = sine_and_cosine(sigma * (theta_x + turn))
     sin_alpha, cos_alpha = sine_and_cosine(alpha)
     c, s = cos_gamma * cos_turn + sin_gamma * sin_turn, sin_gamma * cos_turn - cos_gamma * sin_turn
     s_w, s_r, r_c = g[at.S_WHEEL], g[at.S_RAIL], g[at.RADIUS]
-    h_c = h_r - (r_c - r0)
+    if ti.static(size.get_shape()[0] == OF_WHEEL):
+        r_c += size[LARGER]
+    h_c = h_r - (r_c - radius)
     p = (
         x[1]
         + sigma * b0 * x[2]
@@ -141,13 +170,15 @@ def contact_state(
     )
     if ti.static(irregularity.get_shape()[0] > at.N_IRREGULARITY):
         p += of_left * irregularity[at.WHEEL_LEFT] + of_right * irregularity[at.WHEEL_RIGHT]
+    if ti.static(size.get_shape()[0] == OF_WHEEL):
+        p += radius - r0
 
     # Lateral: the material velocity of the rail head. Vertical: a wheel that follows the rail's shape rolls on it.
     inverse_V = 1.0 / V
     across = (
         dx[0] - V * x[4] - dx[2] * r_c - (rail_rate[1] - V * rail_slope[1]) - h_c * (rail_rate[2] - V * rail_slope[2])
     )
-    advance = V * (s / c) * (x[4] - rail_slope[1] - h_c * rail_slope[2] - (r0 - r_c) * turn_slope - y_slope)
+    advance = V * (s / c) * (x[4] - rail_slope[1] - h_c * rail_slope[2] - (radius - r_c) * turn_slope - y_slope)
     down = (
         dx[1]
         + sigma * (b0 + s_w) * dx[2]
@@ -255,14 +286,17 @@ def placing(state: Template):
 
 
 @ti.func
-def force_directions(sigma: float, r0: float, b0: float, h_r: float, place: Template):
+def force_directions(sigma: float, size: Template, h_r: float, place: Template):
     """Generalised forces of unit (N, Fx, Fy, Mz): on the wheelset (5, 4) and on the rail's w, v, theta_x (3, 4).
 
     The arms are those of the contact point: (sigma (b0 + s_w), r_c) on the wheelset, (sigma s_r, -h_c) on the rail.
     """
     s, c = place[0], place[1]
-    arm, r, s_r = b0 + place[2], place[4], place[3]
-    h_c = h_r - (r - r0)
+    arm, r, s_r = size[1] + place[2], place[4], place[3]
+    radius = size[0]
+    if ti.static(size.get_shape()[0] == OF_WHEEL):
+        radius = size[WHEEL_RADIUS]
+    h_c = h_r - (r - radius)
     wheelset = ti.Matrix(
         [
             [-sigma * s, 0.0, c, 0.0],

@@ -27,14 +27,16 @@ from tiengine.simulation import simulate
 
 from ..fuzzing import BAD, EXAMPLES, mutated_texts, on_many, refused
 
+POINTS = "\n".join(f"{y} {y * y / 2000.0}" for y in range(-30, 31, 3))
 BASE: dict[str, Any] = {
     "name": "fuzzed",
     "train": {
         "vehicles": ["CRH380A_v2", {"like": "CRH2", "car": {"mass": 3e4}}],
         "speed_kmh": [[0.0, 200.0], [30.0, 210.0]],
         "distance": 30.0,
-        "wheel_profile": {"points": "\n".join(f"{y} {y * y / 2000.0}" for y in range(-30, 31, 3))},
+        "wheel_profile": {"points": POINTS},
         "couplings": [{"part": "EMU_intercar", "behind": [1]}],
+        "wheel_profiles": [{"wheelsets": [2], "side": "left", "profile": {"points": POINTS}, "radius": 0.431}],
         "wheel_shapes": [{"kind": "harmonics", "wheelsets": [2], "order": [3], "amplitude": [1e-4]}],
         "forces": [{"motion": "z", "rows": [[0.0, 0.0], [0.1, 1e4]]}],
     },

@@ -144,6 +144,9 @@ def profile(
     help="Equivalent conicity by harmonic linearisation, or by the integral of EN 15302 (without roll).",
 )
 @click.option("--largest", type=float, default=0.008, show_default=True, help="Largest shift [m].")
+@click.option("--left-wheel", help="Profile of the left wheel if another, preset or file.")
+@click.option("--left-rail", help="Profile of the left rail if another, preset or file.")
+@click.option("--left-larger", type=float, default=0.0, help="Radius of the left wheel less that of the right one [m].")
 def contact(
     wheel: str,
     rail: str,
@@ -157,11 +160,17 @@ def contact(
     smoothing: float | None,
     largest: float,
     method: Literal["harmonic", "en15302"],
+    left_wheel: str | None,
+    left_rail: str | None,
+    left_larger: float,
     **placement: float,
 ) -> None:
-    """Evaluate the contact geometry of WHEEL and RAIL, presets or files: rolling radii, conicity, contact points."""
+    """Evaluate the contact geometry of WHEEL and RAIL, presets or files: rolling radii, conicity, contact points.
+
+    With one of the options --left-..., WHEEL and RAIL are those of the right side.
+    """
     from tiengine.contact.point_list import ROUNDING_LENGTH
-    from tiengine.contact.profile import load_profile
+    from tiengine.contact.profile import Profile, load_profile
     from tiengine.contact.table import ContactSettings
     from tiengine.parameters.quantity import build
     from tiengine.report.contact_report import contact_report, draw
@@ -172,20 +181,30 @@ def contact(
         raise InputError(f"smoothing = {length}: must be a finite number")
     if output is not None:
         check_output(output, force=True)
-    report = contact_report(
-        load_profile(wheel, "wheel", smoothing=length, tape_circle=tape_circle, allow_kinks=allow_kinks),
-        load_profile(
-            rail,
+
+    def wheel_of(name: str) -> Profile:
+        return load_profile(name, "wheel", smoothing=length, tape_circle=tape_circle, allow_kinks=allow_kinks)
+
+    def rail_of(name: str) -> Profile:
+        return load_profile(
+            name,
             "rail",
             smoothing=length,
             has_cant=canted,
             mirror=mirror_rail,
             allow_kinks=allow_kinks,
             rail_axis=rail_axis,
-        ),
+        )
+
+    report = contact_report(
+        wheel_of(wheel),
+        rail_of(rail),
         build(ContactSettings, placement, "contact"),
         largest,
         method,
+        left_wheel=wheel_of(left_wheel) if left_wheel else None,
+        left_rail=rail_of(left_rail) if left_rail else None,
+        larger_left=left_larger,
     )
     if output is not None:
         draw(report, output)

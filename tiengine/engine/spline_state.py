@@ -68,7 +68,7 @@ class SplineState(State):
         )  # fmt: skip
         wheels = Contact(
             wheel=model.wheel,
-            table=g.contact.values,
+            table=g.contact_values,
             contact=_first_contact(B, W, rows),
             force=np.zeros((B, W, rows, 4)),
             wheelset_force=np.zeros((B, W, 5)),

@@ -45,7 +45,7 @@ class Contact:
 
     Attributes:
         wheel: Numbers of each wheelset, shape (W, N_WHEEL_NUMBERS).
-        table: Contact geometry, shape (n_u, n_alpha, N_TABLE patches).
+        table: Contact geometry, shape (tables n_u, n_alpha, N_TABLE patches).
         contact: Contact states, shape (B, W, CONTACT_ROWS, N_CONTACT).
         force: N, Fx, Fy, Mz on the wheels, shape (B, W, CONTACT_ROWS, 4).
         wheelset_force: On y, z, roll, pitch, yaw, shape (B, W, 5).
@@ -65,6 +65,11 @@ class Contact:
     def patches(self) -> int:
         """Patches a wheel can have."""
         return int(self.table.shape[2]) // layout.N_TABLE
+
+    @property
+    def own(self) -> int:
+        """1 if wheels have radii and contact tables of their own."""
+        return int(self.wheel[0, layout.RADIUS_LEFT] > 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +198,7 @@ class SplineStep:
                 contact.patches,
                 shaped,
                 int(moving),
+                contact.own,
                 int(state.some_hang),
             ),
             arrays,

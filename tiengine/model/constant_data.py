@@ -114,6 +114,8 @@ def _wheels(ingredients: Ingredients) -> Reals:
     wheel[:, at.SPIN_INERTIA] = train.wheelset_spin_inertia
     if tables is not None:
         wheel[:, at.ROUND_LEFT : at.ROUND_RIGHT + 1] = tables.number
+    if ingredients.contacts is not None:
+        wheel[:, at.RADIUS_LEFT :] = ingredients.contacts.numbers
     return wheel
 
 
@@ -154,5 +156,5 @@ def _constants(ingredients: Ingredients) -> Reals:
     c[at.STATIC_LOAD] = float(np.max(static_wheel_loads(ingredients.train)))
     c[at.ABSORBING_ZONE] = ingredients.absorbing_zone
     c[at.TABLE_U0], c[at.TABLE_DU] = table.u_min, table.du
-    c[at.TABLE_ALPHA0], c[at.TABLE_DALPHA] = table.alpha_min, table.dalpha
+    c[at.TABLE_ALPHA0], c[at.TABLE_DALPHA], c[at.TABLE_ROWS] = table.alpha_min, table.dalpha, len(table.values)
     return c

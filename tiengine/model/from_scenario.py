@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table_cache import contact_table
+from tiengine.contact.wheel_contacts import WheelContacts, wheel_contacts
 from tiengine.irregularity.wheel_shapes import wheel_tables
 from tiengine.model.given_sources import given_sources
 from tiengine.model.ingredients import Ingredients, SlabDesigns
@@ -19,7 +20,7 @@ from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.defects import FailedFastenings, fastening_factors, fastening_plays
 from tiengine.track.slab_matrices import slab_designs
-from tiengine.vehicle.train import assemble
+from tiengine.vehicle.train import TrainModel, assemble, with_wheel_radii
 
 __all__ = ["ingredients"]
 
@@ -46,6 +47,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
     moving = scenario.track.base_motion.file is not None
     if scenario.track.line is not None or scenario.wind.speed is not None or asked.forces or moving:
         train = replace(train, K=train.K + train.K_leaning)
+    contacts = _contacts(scenario, train)
+    train = with_wheel_radii(train, np.array(parts.wheel_radii))
     designs = _designs(scenario)
     dead = slabs_at_rest(scenario, designs)
     return Ingredients(
@@ -56,7 +59,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         mortar=parts.mortar,
         designs=designs,
         train=train,
-        contact=contact_table(parts.wheel, parts.rail_profile, contact_settings(scenario, train)),
+        contact=contacts.tables[0],
+        contacts=None if contacts.alike else contacts,
         friction=scenario.track.friction,
         cross_level_rolls=scenario.contact.cross_level_rolls_rails,
         length=scenario.window_length,
@@ -74,6 +78,13 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         seat_plays=_seat_plays(scenario),
         dead=dead,
     )
+
+
+def _contacts(scenario: Scenario, train: TrainModel) -> WheelContacts:
+    """Contact tables of all wheels."""
+    parts = scenario.parts
+    settings = [contact_settings(scenario, train, w) for w in range(len(train.wheelset_x))]
+    return wheel_contacts(parts.wheel_profiles, parts.rail_profiles, settings, parts.radii, contact_table)
 
 
 def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64]]:

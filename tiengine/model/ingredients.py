@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
+from tiengine.contact.wheel_contacts import WheelContacts
 from tiengine.irregularity.wheel_shapes import WheelTables
 from tiengine.kernels import layout as at
 from tiengine.model.base_motion_loads import BaseMotionLoads
@@ -58,7 +59,8 @@ class Ingredients:
         mortar: Its bed.
         designs: The different slabs.
         train: Vehicles.
-        contact: Contact geometry of wheel and rail.
+        contact: Contact geometry of wheel and rail; that of the first left wheel where they differ.
+        contacts: Contact of every wheel where wheels or rails differ, else None.
         friction: Coefficient of friction.
         cross_level_rolls: Whether a cross level turns the railheads.
         length: Window l [m].
@@ -99,6 +101,7 @@ class Ingredients:
     absorbing_zone: float = 0.0
     shaped: bool = False
     out_of_round: WheelTables | None = None
+    contacts: WheelContacts | None = None
     trains: int = 1
     given: tuple[LoadSource, ...] = ()
     seat_plays: Callable[[int, int], Reals] | None = None
@@ -158,6 +161,11 @@ class Ingredients:
     def rail_loads(self) -> int:
         """Given loads of a rail in a step: on w and v of its trial functions where the ground moves, else none."""
         return 0 if self.moving_ground is None else 2 * self.functions.count
+
+    @property
+    def contact_values(self) -> Reals:
+        """Contact tables of all wheels, shape (tables n_u, n_alpha, 10 patches)."""
+        return self.contact.values if self.contacts is None else self.contacts.values
 
     @property
     def channels(self) -> int:

@@ -135,14 +135,17 @@ class Guard:
         self._shift, self._normal = self.state.relative_shift, self.state.normal_force
         self._tilt = self.state.relative_tilt
         self._static_load = float(static_wheel_loads(self._train).max())
-        table = ingredients.contact
+        table, contacts = ingredients.contact, ingredients.contacts
         # the first node and the last are beyond the range
         self._steepest_tilt, self._innermost = -table.alpha_min - table.dalpha, table.u_min + table.du
-        self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
+        self._climbs = [climbing_shift(each) for each in ((table,) if contacts is None else contacts.tables)]
+        self._least_climb = min(self._climbs)
+        self._table = np.zeros((len(self._train.wheelset_x), 2)) if contacts is None else contacts.number
+        self._derailed = table.u_min + (table.values.shape[0] - 2) * table.du
         self._wheel_front = float(self._train.wheelset_x.max())
         self._nearest_end = float(self.track_end.min())
         squares = [limit * limit for limit in LIMITS]
-        limits = np.array([*squares, self._climb, self._steepest_tilt, self._innermost])
+        limits = np.array([*squares, self._least_climb, self._steepest_tilt, self._innermost])
         self.lookout = Lookout(self.every, limits, self.check_row)
 
     def load(self, done: int, position: NDArray[np.float64]) -> None:
@@ -197,8 +200,8 @@ class Guard:
             self._lifts(step, time, position)
         elif self._flying:
             self.watch.lifted[:], self._flying = 0.0, False
-        if self._shift.max() > self._climb:
-            self._climbs(step, time, position)
+        if self._shift.max() > self._least_climb:
+            self._climb(step, time, position)
         if np.abs(self._tilt).max() > self._steepest_tilt or self._shift.min() < self._innermost:
             self._leaves_table(step, time, position)
         if self.gaps is not None:
@@ -216,11 +219,13 @@ class Guard:
         lasting = lifted >= self.policy.wheel_lift_time
         self._report_wheels(2, lasting, step, time, position, f"off the rail for {self.policy.wheel_lift_time:g} s")
 
-    def _climbs(self, step: int, time: float, position: float) -> None:
+    def _climb(self, step: int, time: float, position: float) -> None:
         """Report wheels beyond the steepest part of their flange, or beyond their profile."""
-        climbs = (self._shift > self._climb) & (self._normal > 0.0)
-        words = f"climbs on its flange: lateral shift beyond {self._climb * 1e3:.1f} mm"
-        self._report_wheels(1, climbs, step, time, position, words)
+        touching = self._normal > 0.0
+        for table, limit in enumerate(self._climbs):
+            climbs = (self._shift > limit) & touching & (self._table == table)
+            words = f"climbs on its flange: lateral shift beyond {limit * 1e3:.1f} mm"
+            self._report_wheels(1, climbs, step, time, position, words)
         words = f"derailed: lateral shift beyond {self._derailed * 1e3:.1f} mm on the flange side"
         self._report_wheels(0, self._shift > self._derailed, step, time, position, words)
 

@@ -146,10 +146,10 @@ class FullStepper:
         )  # fmt: skip
         self._contact = Launch(
             kernels.implicit_and_contact,
-            (track.contact.patches,),
+            (track.contact.patches, int(track.wheel[0, at.RADIUS_LEFT] > 0.0)),
             (
                 self._tick, track.dims, track.constants, buffers.clock, track.numbers, track.inverse, target, sign,
-                self._scattered, track.contact.values, buffers.irregularity, track.wheel, train.wheelset_x, dof,
+                self._scattered, track.contact_values, buffers.irregularity, track.wheel, train.wheelset_x, dof,
                 response, compliance, state.rails, np.zeros((2, W, modes)), np.zeros((W, 2, W, 3, 3)), state.motion,
                 np.zeros((1, W, 2, 9)), state.contact, state.force, state.wheelset_force, state.rail_force,
                 np.zeros((1, W, 5)), np.zeros((1, W, 2, 3)), buffers.wheel,
