@@ -100,3 +100,11 @@ def test_wheels_outside(wheels):
 def test_grading_out_of_order():
     with pytest.raises(InputError, match="must not be below"):
         build(Grading, {"finest": 0.5, "coarsest": 0.2}, "grading")
+
+
+def test_at_defects() -> None:
+    """A track with defects has closer knots far from the wheels, never closer than the finest, never coarser."""
+    assert Grading().at_defects().coarsest == 0.5
+    assert Grading(coarsest=0.3).at_defects().coarsest == 0.3
+    assert Grading(finest=0.6).at_defects().coarsest == 0.6
+    assert Grading().at_defects().finest == Grading().finest

@@ -6,8 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
+from tiengine.engine.compliant_track import CompliantTrack
 from tiengine.engine.sine_state import SineState
-from tiengine.engine.state import State
+from tiengine.engine.state import DISPLACEMENT, State
 from tiengine.engine.static_track import StaticTrack
 from tiengine.kernels import layout as at
 from tiengine.model.constant_data import Model
@@ -15,7 +16,7 @@ from tiengine.model.sine_model import SineModel
 from tiengine.parameters.arrays import Reals
 from tiengine.track.steady_track import RIGID_GROUND, SeatsInWindow, SteadyTrack
 
-__all__ = ["Track", "steady_track"]
+__all__ = ["Track", "put_track", "steady_track"]
 
 
 class Track(Protocol):
@@ -46,8 +47,24 @@ def steady_track(model: Model, state: State, first_seat_s: float, V: float) -> T
         V: Speed [m/s].
     """
     if isinstance(model, SineModel) and isinstance(state, SineState):
+        if model.omitted is not None:
+            return CompliantTrack(model, model.omitted, state, first_seat_s, V)
         return StaticTrack(model, state, first_seat_s, V)
     return SplineTrack(model, state, first_seat_s, V)
+
+
+def put_track(track: Track, state: State, force: Reals) -> None:
+    """Put rails, slabs and seats of all trains of a state into steady motion.
+
+    Args:
+        track: The track under the state's window.
+        state: Written.
+        force: Forces on w, v, theta_x at the wheels, shape (W, 2, 3).
+    """
+    for name, values in zip(("vertical", "lateral", "slabs"), track.motion(force), strict=True):
+        state.put(DISPLACEMENT, name, values)
+    if isinstance(track, CompliantTrack) and isinstance(state, SineState):
+        track.put_seats(state, force)
 
 
 class SplineTrack:
