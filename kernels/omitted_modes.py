@@ -1,6 +1,7 @@
 """Sines left out of the rails, following their forces at once: their part at seats and wheels.
 
-With h(x) the compliance of the omitted sines at a distance x (``track.omitted_modes``), the rail at seat j moves beyond its sines by
+With h(x) the compliance of the omitted sines at a distance x (``track.omitted_modes``), the rail at seat j moves beyond
+its sines by
 
     r_j = sum over wheels of h(s_j - s_w) F_w - sum over seats of h(s_j - s_i) f_i
 
