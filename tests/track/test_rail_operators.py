@@ -159,8 +159,8 @@ def test_graded_knots_follow_the_load():
 def test_the_rate_of_the_speed_hardly_counts():
     """Braking by 1.5 m/s^2: -mu dV/dt u', which the step with splines leaves out, is some millionths.
 
-    Rail on its fastenings smeared along it, under a wheel's vertical and lateral force at 350 km/h: deflection under the
-    wheel, and the largest change anywhere, over the deflection under the wheel.
+    Rail on its fastenings smeared along it, under a wheel's vertical and lateral force at 350 km/h: change of the
+    deflection under the wheel, and the largest anywhere, over the deflection under the wheel.
     """
     f = RailOperators(chn60(), Splines(graded_knots(24.0, np.array([12.0]), Grading())))
     beds = f.foundation(BED["k"], 1.5e7 / 0.63)

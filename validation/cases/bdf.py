@@ -2,10 +2,10 @@
 
 The equations are assembled independently of the step (:mod:`validation.cases.semi_discrete`). The window extends 2 m
 beyond the outer wheels, with three plate elements per slab and one sine per metre (431 degrees of freedom), or 3 m,
-with splines on knots from 0.6 m near the wheels to 2 m, and seats of 0.15 m. A seat that enters acts from one instant on,
-wherever this lies in a step: that is of first order, with seats of 0.15 m and splines 4e-5 at 2.5e-5 s where they enter
-2 m from a wheel, and not to be seen from 3 m. The German spectrum for high disturbance begins within
-2 m, so that all wheels move vertically and laterally. Errors are the largest over all wheels and times, relative to the
+with splines on knots from 0.6 m near the wheels to 2 m, and seats of 0.15 m. A seat that enters acts from one instant
+on, wherever this lies in a step: that is of first order, with splines and seats of 0.15 m 4e-5 at 2.5e-5 s where they
+enter 2 m from a wheel, and not to be seen from 3 m. The German spectrum for high disturbance begins within 2 m, so that
+all wheels move vertically and laterally. Errors are the largest over all wheels and times, relative to the
 range of the forces.
 """
 

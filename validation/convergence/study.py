@@ -287,10 +287,11 @@ CASES = (
             name=f"convergence-mesh-{direction}",
             kind="convergence",
             quantity=f"order in h of the {direction} force's rms error, slab meshes 9 x 2 and 18 x 4",
-            source=f"{AXES['mesh'].finest.label}; ACM element: h^2",
-            reference=2.0,
-            atol=0.5,
-            why="two elements across are not yet in the range of h^2",
+            source=f"{AXES['mesh'].finest.label}; ACM rectangles of one size: h^2 (Lascaux and Lesaint 1975)",
+            reference=1.5,
+            rule="at least",
+            why="h^2 holds for small elements; two across err by more than it tells (beside 36 x 8 over 80 m 44 and 19"
+            " times as much as 18 x 4), so that the order comes out above two, which is no fault",
             compute=lambda direction=direction: _mesh_order(direction),
             quick=False,
         )
