@@ -88,6 +88,27 @@ def push_at_seats(
 
 
 @ti.func
+def add_ground_loads(slab: Array, base: int, dofs: int, down: Template, aside: Template, row: int, table: Array):
+    """Add the inertia forces of a group of slabs on moving ground to SLAB_LOAD.
+
+    Args:
+        slab: State of the slabs.
+        base: Place of the group's first coordinate.
+        dofs: N; the last two are lateral displacement and yaw.
+        down: Acceleration of the ground under the slots, downwards [m/s^2].
+        aside: The same to the right.
+        row: Row of the table.
+        table: Inertia force of each coordinate by unit acceleration [kg, kg m].
+    """
+    for i in range(dofs):
+        k = (base + i) * at.SLAB_ROWS + at.SLAB_LOAD
+        a = down
+        if i >= dofs - 2:
+            a = aside
+        slab[k] = slab[k] - table[row, i] * a
+
+
+@ti.func
 def shift(near: Template, newest: Template, K: Template):
     """Put the newest result before the K ones a row couples with."""
     for q in ti.static(range(K - 1)):
@@ -198,15 +219,15 @@ def bed_forces(
 ):  # fmt: skip
     """Add what of one slab's bed is not in its implicit block to SLAB_LOAD, by way of a copy of its coordinates.
 
-    ``base`` is the place of the first coordinate of the slot's group, ``motion`` has rows u, v, F, shape (3, N); the
-    other arguments are those of :func:`tiengine.kernels.mortar.bed_force_and_pressure`.
+    ``base`` is the place of the first coordinate of the slot's group, ``rest`` is by slot, ``motion`` has rows u, v, F,
+    shape (3, N); the other arguments are those of :func:`tiengine.kernels.mortar.bed_force_and_pressure`.
     """
     lane = slot % 8
     for i in range(dofs):
         s = (base + i) * at.SLAB_ROWS
         motion[0, i], motion[1, i], motion[2, i] = slab[s + row_u][lane], slab[s + row_v][lane], 0.0
     pressure = mortar.bed_force_and_pressure(
-        design, index, shape, weight, factor, rest, lateral_K, lateral_C, numbers[0], numbers[1],
+        design, slot, index, shape, weight, factor, rest, lateral_K, lateral_C, numbers[0], numbers[1],
         ti.cast(numbers[2], ti.i32), ti.cast(numbers[3], ti.i32), 0, dofs, motion, 0, 1, 2,
     )  # fmt: skip
     for i in range(dofs):

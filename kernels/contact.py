@@ -32,18 +32,19 @@ def solve6(matrix_out: Template, x_out: Template):
 
     ``x_out`` holds the right-hand side before and the solution after; the matrix is overwritten.
     """
-    for k in range(6):
-        inverse = 1.0 / matrix_out[k, k]
-        for i in range(k + 1, 6):
-            factor = matrix_out[i, k] * inverse
-            for j in range(k + 1, 6):
+    inverse = ti.Vector.zero(ti.f64, 6)
+    for k in ti.static(range(6)):
+        inverse[k] = 1.0 / matrix_out[k, k]
+        for i in ti.static(range(k + 1, 6)):
+            factor = matrix_out[i, k] * inverse[k]
+            for j in ti.static(range(k + 1, 6)):
                 matrix_out[i, j] -= factor * matrix_out[k, j]
             x_out[i] -= factor * x_out[k]
-    for m in range(6):
-        k = 5 - m
-        for j in range(k + 1, 6):
+    for m in ti.static(range(6)):
+        k = ti.static(5 - m)
+        for j in ti.static(range(k + 1, 6)):
             x_out[k] -= matrix_out[k, j] * x_out[j]
-        x_out[k] /= matrix_out[k, k]
+        x_out[k] *= inverse[k]
 
 
 @ti.func
@@ -104,15 +105,14 @@ def rail_at_end(wheelset: int, free: Template, force: Template, before: Template
 
 @ti.func
 def state_of(
-    side: Template, V: float, r0: float, b0: float, x: Template, dx: Template, rail: Template,
+    side: Template, V: float, size: Template, x: Template, dx: Template, rail: Template,
     irregularity: Template, rolls: int, table: Array, constants: Array, patch: Template,
 ):  # fmt: skip
     """Contact state of a patch of the left (0) or right (1) wheel."""
     return wr.contact_state(
         ti.static(2.0 * side - 1.0),
         V,
-        r0,
-        b0,
+        size,
         x,
         dx,
         ti.Vector([rail[0], rail[1], rail[2]]),
@@ -204,11 +204,13 @@ def solve_wheelset(
     b: int, wheelset: int, V: float, x_free: Template, dx_free: Template, free_l: Template, free_r: Template,
     irregularity: Template, dims: Array, constants: Array, wheel: Array, table: Array, wheelset_compliance: Array,
     rail_coupling: Array, contact: Array, force: Array, wheelset_force: Array, rail_force: Array, tolerance: float,
+    own: Template,
 ):  # fmt: skip
     """Newton's method for the local forces of one wheelset, to a tolerance [N]; returns the number of iterations.
 
     Unknowns are N, Fx, Fy of both wheels; the small spin moments follow the law from one iteration to the next. The
-    free motions of wheelset and rails (left, right) include the response to the forces stored before.
+    free motions of wheelset and rails (left, right) include the response to the forces stored before. With ``own`` = 1
+    wheels have radii and contact tables of their own.
 
     Everything that changes from one iteration to the next is local: Taichi 1.7.4 treats a load with a literal index
     and a store with a loop index as different places and moves the load out of the loop.
@@ -219,15 +221,16 @@ def solve_wheelset(
         before[m] = wheelset_force[b, wheelset, m]
     f_l, f_r = stored_force(b, wheelset, 0, 4, force), stored_force(b, wheelset, 1, 4, force)
     place_l, place_r = stored_place(b, wheelset, 0, contact), stored_place(b, wheelset, 1, contact)
-    r0, b0, h_r = wheel[wheelset, 0], wheel[wheelset, 1], constants[at.ARM_HEAD]
+    size_l, size_r = wr.size_of(wheelset, 0, wheel, own), wr.size_of(wheelset, 1, wheel, own)
+    h_r = constants[at.ARM_HEAD]
     rolls = dims[at.CROSS_LEVEL_ROLLS]
     iterations = 0
     remains, change = 2.0 * tolerance, 0.0
     share, best = 1.0, 1e300
     base_l, base_r, step = f_l, f_r, ti.Vector.zero(ti.f64, 6)
     while remains > tolerance and iterations < ITERATIONS:
-        B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, place_l)
-        B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, place_r)
+        B_l, R_l = wr.force_directions(-1.0, size_l, h_r, place_l)
+        B_r, R_r = wr.force_directions(1.0, size_r, h_r, place_r)
         increment = B_l @ f_l + B_r @ f_r - before
         a = ti.Vector.zero(ti.f64, 5)
         for m in ti.static(range(5)):
@@ -237,8 +240,8 @@ def solve_wheelset(
         dx = dx_free + constants[at.GAMMA_DT] * a
         rail_l = rail_at_end(wheelset, free_l, R_l @ f_l, before_l, constants, rail_coupling)
         rail_r = rail_at_end(wheelset, free_r, R_r @ f_r, before_r, constants, rail_coupling)
-        left = state_of(0, V, r0, b0, x, dx, rail_l, irregularity, rolls, table, constants, 0)
-        right = state_of(1, V, r0, b0, x, dx, rail_r, irregularity, rolls, table, constants, 0)
+        left = state_of(0, V, size_l, x, dx, rail_l, irregularity, rolls, table, constants, 0)
+        right = state_of(1, V, size_r, x, dx, rail_r, irregularity, rolls, table, constants, 0)
         store_state(b, wheelset, 0, left, contact)
         store_state(b, wheelset, 1, right, contact)
         place_l, place_r = wr.placing(left), wr.placing(right)
@@ -269,8 +272,8 @@ def solve_wheelset(
             f_r[m] = base_r[m] + share * step[3 + m]
         f_l[3], f_r[3] = law_l[3], law_r[3]
         iterations += 1
-    B_l, R_l = wr.force_directions(-1.0, r0, b0, h_r, place_l)
-    B_r, R_r = wr.force_directions(1.0, r0, b0, h_r, place_r)
+    B_l, R_l = wr.force_directions(-1.0, size_l, h_r, place_l)
+    B_r, R_r = wr.force_directions(1.0, size_r, h_r, place_r)
     q = B_l @ f_l + B_r @ f_r
     for m in ti.static(range(5)):
         wheelset_force[b, wheelset, m] = q[m]

@@ -59,6 +59,7 @@ MOTION_ROWS = 7
     TABLE_DU,
     TABLE_ALPHA0,
     TABLE_DALPHA,
+    TABLE_ROWS,  # of one table, where wheels or rails differ
     SMEARED_VERTICAL,  # A_s: smeared fastenings of the implicit rail blocks, by mode [kg]
     SMEARED_LATERAL,
     RESIDUAL_VERTICAL,  # compliance of the truncated modes under a wheel in w, v, theta_x; zero if not added
@@ -66,7 +67,7 @@ MOTION_ROWS = 7
     RESIDUAL_TORSION,
     ABSORBING_ZONE,  # length of the zones at the window's ends with more fastening, to the ground [m]
     N_CONSTANTS,
-) = range(32)
+) = range(33)
 
 # Columns of ``clock[step, :]`` (float64): the window at t_{n+1}.
 (POSITION, SPEED, SPEED_RATE, FIRST_SEAT_S, FIRST_SEAT, FIRST_SLAB, N_CLOCK) = range(7)
@@ -85,8 +86,12 @@ MOTION_ROWS = 7
 (GROWN, GROWN_SLOPE, TURNED, N_SHAPED) = range(N_IRREGULARITY + 4, N_IRREGULARITY + 8)
 (WHEEL_LEFT, WHEEL_RIGHT, WHEEL_LEFT_SLOPE, WHEEL_RIGHT_SLOPE, N_FELT) = range(N_IRREGULARITY + 4, N_IRREGULARITY + 9)
 
-# Numbers of a wheelset: r0, b0, spin inertia, tables of its wheels out of round (-1 for none).
-(NOMINAL_RADIUS, HALF_SPACING, SPIN_INERTIA, ROUND_LEFT, ROUND_RIGHT, N_WHEEL_NUMBERS) = range(6)
+# Numbers of a wheelset: r0, b0, spin inertia, tables of its wheels out of round (-1 for none). Where wheels or rails
+# differ, also of either wheel its radius, how much larger that is than its table's, the crown offset of its rail, the
+# first row of its contact table; else -1.
+(NOMINAL_RADIUS, HALF_SPACING, SPIN_INERTIA, ROUND_LEFT, ROUND_RIGHT) = range(5)
+(RADIUS_LEFT, RADIUS_RIGHT, LARGER_LEFT, LARGER_RIGHT) = range(5, 9)
+(CROWN_LEFT, CROWN_RIGHT, ROW_LEFT, ROW_RIGHT, N_WHEEL_NUMBERS) = range(9, 14)
 
 # Points of the table of a wheel out of round; the tables stand behind the numbers of ``constants``.
 ROUND_POINTS = 4096

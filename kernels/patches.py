@@ -18,19 +18,19 @@ def solve_wheelset(
     b: int, wheelset: int, V: float, x_free: Template, dx_free: Template, free_l: Template, free_r: Template,
     irregularity: Template, dims: Array, constants: Array, wheel: Array, table: Array, wheelset_compliance: Array,
     rail_coupling: Array, contact: Array, force: Array, wheelset_force: Array, rail_force: Array, tolerance: float,
-    patches: Template,
+    patches: Template, own: Template,
 ):  # fmt: skip
     """Solve one wheelset with so many patches a wheel; returns the number of iterations."""
     count = 0
     if ti.static(patches == 1):
         count = ct.solve_wheelset(
             b, wheelset, V, x_free, dx_free, free_l, free_r, irregularity, dims, constants, wheel, table,
-            wheelset_compliance, rail_coupling, contact, force, wheelset_force, rail_force, tolerance,
+            wheelset_compliance, rail_coupling, contact, force, wheelset_force, rail_force, tolerance, own,
         )  # fmt: skip
     else:
         count = tp.solve_two(
             b, wheelset, V, x_free, dx_free, free_l, free_r, irregularity, dims, constants, wheel, table,
-            wheelset_compliance, rail_coupling, contact, force, wheelset_force, rail_force, tolerance,
+            wheelset_compliance, rail_coupling, contact, force, wheelset_force, rail_force, tolerance, own,
         )  # fmt: skip
     return count
 
@@ -62,16 +62,16 @@ def record_wheels(
 def one_at_given_motion(
     b: int, wheelset: int, V: float, rolls: int, x: Template, dx: Template, left: Template, right: Template,
     irregularity: Template, constants: Array, table: Array, wheel: Array, contact_out: Array, force_out: Array,
-    wheelset_force_out: Array, rail_force_out: Array,
+    wheelset_force_out: Array, rail_force_out: Array, own: Template,
 ):  # fmt: skip
     """Contact states and forces of a wheelset with one patch a wheel at given motions of it and its rails."""
-    r0, b0, h_r = wheel[wheelset, 0], wheel[wheelset, 1], constants[at.ARM_HEAD]
-    rails = [left, right]
+    h_r, rails = constants[at.ARM_HEAD], [left, right]
     q = ti.Vector.zero(ti.f64, 5)
     for side in ti.static(range(2)):
-        state = ct.state_of(side, V, r0, b0, x, dx, rails[side], irregularity, rolls, table, constants, 0)
+        size = wr.size_of(wheelset, side, wheel, own)
+        state = ct.state_of(side, V, size, x, dx, rails[side], irregularity, rolls, table, constants, 0)
         f, _ = wr.contact_law(state, constants[at.FRICTION])
-        B, R = wr.force_directions(ti.static(2.0 * side - 1.0), r0, b0, h_r, wr.placing(state))
+        B, R = wr.force_directions(ti.static(2.0 * side - 1.0), size, h_r, wr.placing(state))
         q = q + B @ f
         ct.store_state(b, wheelset, side, state, contact_out)
         ct.store_force(b, wheelset, side, f, R @ f, force_out, rail_force_out)
@@ -82,6 +82,7 @@ def one_at_given_motion(
 @ti.kernel
 def wheel_forces(
     patches: Template,
+    own: Template,
     V: float,
     rolls: int,
     constants: Reals1,
@@ -100,11 +101,12 @@ def wheel_forces(
 
     Args:
         patches: Patches a wheel can have, 1 or 2.
+        own: 1 if wheels have radii and contact tables of their own.
         V: Speed [m/s].
         rolls: 1 if a cross level turns the railheads.
         constants: Numbers, see ``layout``.
-        table: Contact geometry, shape (n_u, n_alpha, N_TABLE patches).
-        wheel: r0, b0, spin inertia of each wheelset, shape (wheelsets, 3).
+        table: Contact geometry, shape (tables n_u, n_alpha, N_TABLE patches).
+        wheel: Numbers of each wheelset, shape (wheelsets, N_WHEEL_NUMBERS).
         irregularity: Track channels, shape (trains, wheelsets, N_IRREGULARITY).
         wheelset_u: y, z, roll, pitch, yaw, shape (trains, wheelsets, 5).
         wheelset_v: Their rates.
@@ -128,10 +130,10 @@ def wheel_forces(
             if ti.static(patches == 1):
                 one_at_given_motion(
                     b, w, V, rolls, x, dx, left, right, channels, constants, table, wheel, contact_out, force_out,
-                    wheelset_force_out, rail_force_out,
+                    wheelset_force_out, rail_force_out, own,
                 )  # fmt: skip
             else:
                 tp.two_at_given_motion(
                     b, w, V, rolls, x, dx, left, right, channels, constants, table, wheel, contact_out, force_out,
-                    wheelset_force_out, rail_force_out,
+                    wheelset_force_out, rail_force_out, own,
                 )  # fmt: skip

@@ -66,14 +66,20 @@ WHEEL_ROWS, WHEEL_COLUMNS, N_WHEEL_FUNCTION = 0, 16, 24
     PASSES,
     LOAD_STEP,  # vectors from a step's row of loads to the next step's, 0 if all have the same
     LOAD_TRAIN,  # from a train's rows to the next train's
+    LOAD_GROUND,  # from a row's first vector to the ground's accelerations, where it moves
     N_SIZE,
-) = range(12)
+) = range(13)
 
-# Entries of ``job`` (int32): what a launch does.
-(FIRST_STEP, STEPS, STAGES, N_JOB) = range(4)
+# Entries of ``job`` (int32): what a launch does; with LOOK_EVERY > 0 it looks at the state every so many steps, of
+# which STEPS_BEFORE lie before the chunk, and stops where a guard must check it, with LOOK_ALWAYS at the first look.
+(FIRST_STEP, STEPS, STAGES, LOOK_EVERY, STEPS_BEFORE, LOOK_ALWAYS, N_JOB) = range(7)
 SEATS_STAGE, PULL_STAGE, EXCHANGE_STAGE, SEAT_FORCE_STAGE = 1, 2, 4, 8
 FORWARD_STAGE, CONTACT_STAGE, BACKWARD_STAGE, SLAB_STAGE, CAR_STAGE, PREDICT_STAGE = 16, 32, 64, 128, 256, 512
 ALL_STAGES = 1023
+
+# Limits of a sound state: sums of squares of coordinates, rates, second rates; a wheel's lateral shift, tilt, and shift
+# the other way.
+(SQUARES, LARGEST_SHIFT, LARGEST_TILT, SMALLEST_SHIFT, N_LIMITS) = (0, 3, 4, 5, 6)
 
 # Columns of a span of the knots: rear and front end [m], four functions' c0..c3 in s - rear end, the first's number.
 SPAN_REAR, SPAN_FRONT, SPAN_POLYNOMIALS, SPAN_FIRST, N_SPAN = 0, 1, 2, 18, 19

@@ -12,7 +12,8 @@ A step t_n -> t_{n+1} of a chunk of trains, which stays in the cache meanwhile; 
       wheels' forces by one-sided columns into y; backward sweep a = U^-1 y; u = u~ + beta dt^2 a, v = v~ + gamma dt a
       slabs: loads of the seats, bed where it is explicit, banded solve, correctors; cars' correctors
 
-Between launches rows U, V, A of all arrays hold the state at the last step's end, for reading and writing.
+Between launches rows U, V, A of all arrays hold the state at the last step's end, for reading and writing. A launch of
+several steps that looks at the state (``spline_squares``) leaves out those after one at which a guard must check it.
 """
 
 from typing import Any
@@ -24,6 +25,7 @@ from tiengine.kernels import contact as ct
 from tiengine.kernels import layout, spline_rail
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels import spline_seats as seats
+from tiengine.kernels import spline_squares as squares
 from tiengine.kernels import spline_wheels as wheels
 from tiengine.kernels import vehicle_columns as cars
 from tiengine.kernels.types import Array, Ints1, Ints2, Ints3, Reals1, Reals2, Reals3, Reals4, Reals5, Template
@@ -66,7 +68,7 @@ def sweep_slabs(
             slabs.clear_loads(slab, base, dofs)
 
 
-def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> Any:
+def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, moving: int, own: int, hanging: int) -> Any:
     """Make the kernel.
 
     Args:
@@ -75,6 +77,9 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
         blocks: Vectors in a row of a car.
         patches: Patches a wheel.
         shaped: 1 if rails have shapes or wheels are out of round.
+        moving: 1 if the ground moves in time.
+        own: 1 if wheels have radii and contact tables of their own.
+        hanging: 1 if some seats hang.
     """
     lane_vectors = ti.types.ndarray(dtype=ti.types.vector(lanes, ti.f64), ndim=1)
     eights = ti.types.ndarray(dtype=ti.types.vector(8, ti.f64), ndim=1)
@@ -83,6 +88,8 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
     @ti.kernel
     def spline_steps(
         job: Ints1,
+        limits: Reals1,
+        stopped_out: Ints1,
         record: Ints1,
         size: Ints1,
         dims: Ints1,
@@ -93,6 +100,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
         coefficient: Reals1,
         # seats
         seat: lane_vectors,
+        seat_play: lane_vectors,
         seat_point: Reals2,
         span: Reals2,
         seat_place: Ints2,
@@ -144,7 +152,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
         bed_lateral_K: Reals3,
         bed_lateral_C: Reals3,
         bed_numbers: Reals1,
-        bed_motion: Reals2,
+        slab_rows: Reals2,  # u, v, F of a copy of a slab; its inertia force by unit acceleration of the ground
         pressure: Reals3,
     ):
         """Steps of all chunks, chunk by chunk. Arrays as in ``tiengine.engine.spline_step``."""
@@ -153,6 +161,8 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
             c = chunk_step // job[at.STEPS]
             step = job[at.FIRST_STEP] + chunk_step % job[at.STEPS]
             n, dofs, stages = size[at.FUNCTIONS], size[at.SLAB_DOFS], job[at.STAGES]
+            if stopped_out[0] >= 0:
+                stages = 0
             V, V_rate, s0 = clock[step, layout.SPEED], clock[step, layout.SPEED_RATE], clock[step, layout.FIRST_SEAT_S]
             dt, beta_dt2, gamma_dt = constants[layout.DT], constants[layout.BETA_DT2], constants[layout.GAMMA_DT]
             base2 = constants[layout.HALF_BASE] * constants[layout.HALF_BASE]
@@ -197,9 +207,11 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
                 if stages & at.SEAT_FORCE_STAGE:
                     seats.seat_forces(
                         c, first, row_u, row_v, s0, last_pass, size, constants, seat_place, seat_shape, rail, seat,
-                        lanes,
+                        seat_play, hanging, lanes,
                     )  # fmt: skip
                 if stages & at.FORWARD_STAGE:
+                    if ti.static(moving == 1):
+                        spline_rail.add_ground_loads(rail, first, n, step, clock, lanes)
                     if p == 0:
                         spline_rail.forward(rail, first, n, coefficient, 1, lanes)
                     else:
@@ -231,7 +243,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
                             b, c, 2 * (b - b0), step, V, tolerance, row, dims, constants, wheel_place,
                             wheelset_place, car_columns_start, car_columns, wheel, table, irregularity,
                             wheelset_compliance, coupling, contact, force, wheelset_force, rail_force, iterations,
-                            wheel_record, car, under, car_load, size, blocks, patches, shaped,
+                            wheel_record, car, under, car_load, size, blocks, patches, shaped, own,
                         )  # fmt: skip
                     wheels.add_wheel_columns(c, first, dims, wheel_place, wheel_rows, rail, under)
                 if stages & at.BACKWARD_STAGE:
@@ -254,6 +266,14 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
                             slab, g * (dofs + 2 * K) + K, dofs, g * at.SLAB_SEAT_ROWS * per_slab, per_slab,
                             slab_seat_index, slab_seat_shape, slab_seat_x, slab_seat,
                         )  # fmt: skip
+                    if ti.static(moving == 1):
+                        for b in range(b0, b_end):
+                            row = cars.load_row(b, step, size, blocks) + size[at.LOAD_GROUND]
+                            for g in range(groups):
+                                slabs.add_ground_loads(
+                                    slab, (b * groups + g) * (dofs + 2 * K) + K, dofs, car_load[row + g],
+                                    car_load[row + groups + g], 3, slab_rows,
+                                )  # fmt: skip
                     if dims[layout.MORTAR_MODE] > 0:
                         for b in range(b0, b_end):
                             for slot in range(dims[layout.SLOTS]):
@@ -261,7 +281,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
                                 slabs.bed_forces(
                                     b, slot, group * (dofs + 2 * K) + K, row_u, row_v, dofs,
                                     ti.cast(slab_design[group][slot % 8], ti.i32), bed_index, bed_shape, bed_weight,
-                                    bed_factor, bed_rest, bed_lateral_K, bed_lateral_C, bed_numbers, slab, bed_motion,
+                                    bed_factor, bed_rest, bed_lateral_K, bed_lateral_C, bed_numbers, slab, slab_rows,
                                     pressure,
                                 )  # fmt: skip
                     for b in range(b0, b0 + trains_a_chunk):
@@ -278,5 +298,12 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int) -> A
                     if ahead == 1:
                         for g in range(b0 * groups, (b0 + trains_a_chunk) * groups):
                             slabs.predict(slab, g * (dofs + 2 * K) + K, dofs, constants)
+            if stages != 0 and job[at.LOOK_EVERY] > 0:
+                if (job[at.STEPS_BEFORE] + step + 1) % job[at.LOOK_EVERY] == 0:
+                    found = job[at.LOOK_ALWAYS]
+                    if found == 0:
+                        found = squares.needs_check(limits, dims, rail, slab, car, contact, force, lanes, blocks)
+                    if found == 1:
+                        stopped_out[0] = step
 
     return spline_steps

@@ -159,12 +159,14 @@ def contact_of_train(
     irregularity: Array, wheelset_compliance: Array, coupling: Array, contact: Array, force: Array,
     wheelset_force: Array, rail_force: Array, iterations_out: Array, wheel_record_out: Array, car: Array,
     under: Array, load: Array, size: Array, blocks: Template, patches: Template, shaped: Template,
+    own: Template,
 ):  # fmt: skip
     """Solve the contact of all wheelsets of a train, one after another, and leave the rails' loads in ``under``.
 
     A wheelset yaws against the rails with its own rate and that of the track frame. ``lane`` is the train's left rail;
     ``record`` is the row of the wheels' record to fill, -1 for none; with ``shaped`` = 1 rails have shapes or wheels
-    are out of round (``out_of_round``); other arguments as in ``contact``, ``vehicle_columns`` and this module.
+    are out of round (``out_of_round``), with ``own`` = 1 wheels have radii and contact tables of their own; other
+    arguments as in ``contact``, ``vehicle_columns`` and this module.
     """
     start = b * size[at.CARS] * at.CAR_ROWS * blocks * 8
     yaw_rate = (load_row(b, step, size, blocks) + size[at.CARS] * blocks) * 8 + size[at.ELEMENTS]
@@ -180,7 +182,7 @@ def contact_of_train(
             before[m] = wheelset_force[b, w, m]
         count = pt.solve_wheelset(
             b, w, V, x, dx, left, right, channels, dims, constants, wheel, table, wheelset_compliance, coupling,
-            contact, force, wheelset_force, rail_force, tolerance, patches,
+            contact, force, wheelset_force, rail_force, tolerance, patches, own,
         )  # fmt: skip
         add_wheelset_change(
             b, w, start, before, wheelset_place, wheelset_force, car_columns_start, columns, car, blocks

@@ -142,8 +142,8 @@ def mortar_forces(
                 for i in range(base, base + n):
                     motion[at.F, i] = 0.0
                 pressure = mortar.bed_force_and_pressure(
-                    design[b, slot], index, shape, weight, factor, at_rest, lateral_K, lateral_C, numbers[0],
-                    numbers[1], explicit, no_tension, base, n, motion, rows[0], rows[1], at.F,
+                    design[b, slot], design[b, slot], index, shape, weight, factor, at_rest, lateral_K, lateral_C,
+                    numbers[0], numbers[1], explicit, no_tension, base, n, motion, rows[0], rows[1], at.F,
                 )  # fmt: skip
                 for m in ti.static(range(2)):
                     pressure_out[b, slot, m] = pressure[m]
@@ -153,6 +153,7 @@ def mortar_forces(
 def forces_and_contact(
     parallel: Template,
     patches: Template,
+    own: Template,
     tick: Ints1,
     rows: Ints1,
     dims: Ints1,
@@ -241,7 +242,7 @@ def forces_and_contact(
                 count = pt.solve_wheelset(
                     b, w, V, x, dx, left, right, channels, dims, constants, wheel, table, wheelset_compliance,
                     rail_coupling, contact, force, wheelset_force, rail_force, tolerance,
-                    patches,
+                    patches, own,
                 )  # fmt: skip
                 uw.add_wheelset_force(b, w, 1.0, dims, wheelset_dof, wheelset_force, motion)
                 iterations_out[b, w] = ti.max(iterations_out[b, w], count)

@@ -47,7 +47,7 @@ def stored_rows(b: int, wheelset: int, count: Template, columns: Template, array
 
 @ti.func
 def patch_state(
-    c: int, V: float, r0: float, b0: float, x: Template, dx: Template, rails: Template, irregularity: Template,
+    c: int, V: float, size: Template, x: Template, dx: Template, rails: Template, irregularity: Template,
     rolls: int, table: Array, constants: Array,
 ):  # fmt: skip
     """Contact state of patch c; ``rails`` has the motion of either rail in a row.
@@ -56,7 +56,7 @@ def patch_state(
     """
     side = c % 2
     state = wr.contact_state(
-        2.0 * side - 1.0, V, r0, b0, x, dx,
+        2.0 * side - 1.0, V, size, x, dx,
         ti.Vector([rails[side, 0], rails[side, 1], rails[side, 2]]),
         ti.Vector([rails[side, 3], rails[side, 4], rails[side, 5]]),
         ti.Vector([rails[side, 6], rails[side, 7], rails[side, 8]]),
@@ -69,16 +69,16 @@ def patch_state(
 
 
 @ti.func
-def directions_of(c: int, r0: float, b0: float, h_r: float, states: Template):
+def directions_of(c: int, size: Template, h_r: float, states: Template):
     """Generalised forces of unit (N, Fx, Fy, Mz) of patch c, from its contact state."""
     place = ti.Vector([states[c, wr.SIN], states[c, wr.COS], states[c, wr.S_W], states[c, wr.S_R], states[c, wr.R_C]])
-    return wr.force_directions(2.0 * (c % 2) - 1.0, r0, b0, h_r, place)
+    return wr.force_directions(2.0 * (c % 2) - 1.0, size, h_r, place)
 
 
 @ti.func
 def store_wheels(
-    b: int, wheelset: int, r0: float, b0: float, h_r: float, states: Template, f: Template, contact_out: Array,
-    force_out: Array, wheelset_force_out: Array, rail_force_out: Array,
+    b: int, wheelset: int, h_r: float, states: Template, f: Template, wheel: Array, contact_out: Array,
+    force_out: Array, wheelset_force_out: Array, rail_force_out: Array, own: Template,
 ):  # fmt: skip
     """Store the states and forces of all patches, those of both wheels, and the forces on wheelset and rails."""
     total = ti.Matrix.zero(ti.f64, 2, 4)
@@ -86,7 +86,7 @@ def store_wheels(
     on_wheelset = ti.Vector.zero(ti.f64, 5)
     for c in range(PATCHES):
         local = ti.Vector([f[c, 0], f[c, 1], f[c, 2], f[c, 3]])
-        B, R = directions_of(c, r0, b0, h_r, states)
+        B, R = directions_of(c, wr.size_of(wheelset, c % 2, wheel, own), h_r, states)
         q, r = B @ local, R @ local
         on_wheelset = on_wheelset + q
         for m in ti.static(range(3)):
@@ -177,6 +177,7 @@ def solve_two(
     b: int, wheelset: int, V: float, x_free: Template, dx_free: Template, free_l: Template, free_r: Template,
     irregularity: Template, dims: Array, constants: Array, wheel: Array, table: Array, wheelset_compliance: Array,
     rail_coupling: Array, contact: Array, force: Array, wheelset_force: Array, rail_force: Array, tolerance: float,
+    own: Template,
 ):  # fmt: skip
     """Newton's method for the local forces of all patches of a wheelset; see ``contact.solve_wheelset``."""
     before = ti.Vector.zero(ti.f64, 5)
@@ -186,7 +187,7 @@ def solve_two(
     f = stored_rows(b, wheelset, PATCHES, 4, force)
     base = f
     states = stored_rows(b, wheelset, PATCHES, wr.N_CONTACT, contact)
-    r0, b0, h_r = wheel[wheelset, 0], wheel[wheelset, 1], constants[at.ARM_HEAD]
+    h_r = constants[at.ARM_HEAD]
     rolls = dims[at.CROSS_LEVEL_ROLLS]
     iterations = 0
     remains, change = 2.0 * tolerance, 0.0
@@ -197,7 +198,7 @@ def solve_two(
         increment, pressed = ti.Vector.zero(ti.f64, 5), ti.Matrix.zero(ti.f64, 2, 3)
         for c in range(PATCHES):
             local = ti.Vector([f[c, 0], f[c, 1], f[c, 2], f[c, 3]])
-            on_wheelset, on_rail = directions_of(c, r0, b0, h_r, states)
+            on_wheelset, on_rail = directions_of(c, wr.size_of(wheelset, c % 2, wheel, own), h_r, states)
             increment = increment + on_wheelset @ local
             pushed = on_rail @ local
             for n in ti.static(range(3)):
@@ -224,7 +225,8 @@ def solve_two(
         D = ti.Matrix.zero(ti.f64, UNKNOWNS, 3)
         size = 6
         for c in range(PATCHES):
-            state = patch_state(c, V, r0, b0, x, dx, rails, irregularity, rolls, table, constants)
+            size_c = wr.size_of(wheelset, c % 2, wheel, own)
+            state = patch_state(c, V, size_c, x, dx, rails, irregularity, rolls, table, constants)
             law, slopes = wr.contact_law(state, constants[at.FRICTION])
             for m in ti.static(range(wr.N_CONTACT)):
                 states[c, m] = state[m]
@@ -256,7 +258,7 @@ def solve_two(
                 f[c, m] = base[c, m] + share * step[3 * c + m]
             f[c, 3] = spin[c]
         iterations += 1
-    store_wheels(b, wheelset, r0, b0, h_r, states, f, contact, force, wheelset_force, rail_force)
+    store_wheels(b, wheelset, h_r, states, f, wheel, contact, force, wheelset_force, rail_force, own)
     return iterations
 
 
@@ -264,19 +266,20 @@ def solve_two(
 def two_at_given_motion(
     b: int, wheelset: int, V: float, rolls: int, x: Template, dx: Template, left: Template, right: Template,
     irregularity: Template, constants: Array, table: Array, wheel: Array, contact_out: Array, force_out: Array,
-    wheelset_force_out: Array, rail_force_out: Array,
+    wheelset_force_out: Array, rail_force_out: Array, own: Template,
 ):  # fmt: skip
     """The same with two patches a wheel."""
-    r0, b0, h_r = wheel[wheelset, 0], wheel[wheelset, 1], constants[at.ARM_HEAD]
+    h_r = constants[at.ARM_HEAD]
     rails = ti.Matrix.zero(ti.f64, 2, 9)
     for m in ti.static(range(9)):
         rails[0, m], rails[1, m] = left[m], right[m]
     states, f = ti.Matrix.zero(ti.f64, PATCHES, wr.N_CONTACT), ti.Matrix.zero(ti.f64, PATCHES, 4)
     for c in range(PATCHES):
-        state = patch_state(c, V, r0, b0, x, dx, rails, irregularity, rolls, table, constants)
+        size = wr.size_of(wheelset, c % 2, wheel, own)
+        state = patch_state(c, V, size, x, dx, rails, irregularity, rolls, table, constants)
         law, _ = wr.contact_law(state, constants[at.FRICTION])
         for m in ti.static(range(wr.N_CONTACT)):
             states[c, m] = state[m]
         for m in ti.static(range(4)):
             f[c, m] = law[m]
-    store_wheels(b, wheelset, r0, b0, h_r, states, f, contact_out, force_out, wheelset_force_out, rail_force_out)
+    store_wheels(b, wheelset, h_r, states, f, wheel, contact_out, force_out, wheelset_force_out, rail_force_out, own)

@@ -27,14 +27,16 @@ from tiengine.simulation import simulate
 
 from ..fuzzing import BAD, EXAMPLES, mutated_texts, on_many, refused
 
+POINTS = "\n".join(f"{y} {y * y / 2000.0}" for y in range(-30, 31, 3))
 BASE: dict[str, Any] = {
     "name": "fuzzed",
     "train": {
         "vehicles": ["CRH380A_v2", {"like": "CRH2", "car": {"mass": 3e4}}],
         "speed_kmh": [[0.0, 200.0], [30.0, 210.0]],
         "distance": 30.0,
-        "wheel_profile": {"points": "\n".join(f"{y} {y * y / 2000.0}" for y in range(-30, 31, 3))},
+        "wheel_profile": {"points": POINTS},
         "couplings": [{"part": "EMU_intercar", "behind": [1]}],
+        "wheel_profiles": [{"wheelsets": [2], "side": "left", "profile": {"points": POINTS}, "radius": 0.431}],
         "wheel_shapes": [{"kind": "harmonics", "wheelsets": [2], "order": [3], "amplitude": [1e-4]}],
         "forces": [{"motion": "z", "rows": [[0.0, 0.0], [0.1, 1e4]]}],
     },
@@ -45,6 +47,8 @@ BASE: dict[str, Any] = {
         "failed_fastenings": [{"seats": [40, 42], "rail": "left", "factor": 0.5}],
         "mortar_voids": [{"slab": 5, "x": [0.5, 1.0], "y": [-0.5, 0.5]}],
         "rail_shapes": [{"kind": "weld", "at": 60.0, "length": 1.0, "depth": 2e-4}],
+        "ground": [{"kind": "angles", "at": 70.0, "length": 12.0, "depth": 5e-3, "lateral": -1e-3}],
+        "base_motion": {"file": "quake.csv", "start": 0.5, "wave_speed": 500.0, "at": 20.0},
     },
     "irregularity": {"spectrum": "german_low", "seed": 3},
     "wind": {"speed": 5.0, "gust": "en14067", "gust_at": 60.0},

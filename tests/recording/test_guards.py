@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.kinds import make_stepper, state_at_rest
+from tiengine.engine.spline_stepper import SplineStepper
 from tiengine.engine.state import DISPLACEMENT, PARTS, VELOCITY
-from tiengine.engine.stepper import Rows
+from tiengine.engine.stepper import Plan, Rows
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError, RunFailedError
 from tiengine.recording.guards import Guard, climbing_shift
@@ -226,6 +229,61 @@ def test_events_are_in_the_file_and_samples_end_with_them(tmp_path):
         assert np.isfinite(result.wheel()["normal_force"][:-5]).all()  # a check is at most five steps late
     assert notes
     assert str(notes[-1]).startswith(str(events["message"][-1]))
+
+
+def test_launches_stop_where_a_check_is_needed(tmp_path, monkeypatch: pytest.MonkeyPatch):
+    """A launch of many steps that looks at the state itself finds what a check every millisecond finds: same bits.
+
+    The roughness begins within a metre: in the second run wheels leave the rails and come back, the last one derails.
+    """
+    for scale, ends in ((0.2, False), (1.0, False), (100.0, True)):
+        found = []
+        for looks in (True, False):
+            with monkeypatch.context() as patch:
+                checks = count_checks(patch)
+                if not looks:
+                    patch.setattr(SplineStepper, "look_out", lambda self, lookout: False)
+                path = tmp_path / f"{scale}{looks}.h5"
+                with pytest.raises(RunFailedError) if ends else nullcontext():
+                    simulate.run(short(irregularity__scale=scale, events__wheel_lift_time=2e-3), path)
+            with simulate.open_result(path) as result:
+                events, wheel = result.group("events"), result.wheel()
+                found.append(({key: list(events[key]) for key in events}, np.array(wheel["normal_force"]), len(checks)))
+        assert found[0][0] == found[1][0]
+        np.testing.assert_array_equal(found[0][1], found[1][1])
+        assert found[0][2] <= found[1][2]
+        if scale == 0.2:
+            assert found[0][2] < 0.2 * found[1][2]
+        if scale == 1.0:
+            assert (found[0][1] == 0.0).any()
+
+
+def count_checks(patch: pytest.MonkeyPatch) -> list[int]:
+    """Steps after which a guard checks, filled as it does."""
+    checks: list[int] = []
+    check = Guard.check
+    patch.setattr(Guard, "check", lambda self, step, position: (checks.append(step), check(self, step, position)))
+    return checks
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e30])
+@pytest.mark.parametrize("part", ["vertical", "lateral", "slabs", "vehicles"])
+def test_a_launch_stops_at_numbers_that_run_away(part: str, value: float):
+    """It ends after the first step that is looked at, here the fifth; the check names the part."""
+    guard = guard_of(Events(), steps=20)
+    stepper = guard.stepper
+    assert guard.called
+    values = guard.state.part(0, part)[VELOCITY]
+    values[(0,) * values.ndim] = value
+    guard.state.put(VELOCITY, part, values[None])
+    count = 20
+    stepper.load(np.zeros(count), np.full(count, 80.0), np.zeros(count), np.zeros_like(stepper.chunk.irregularity))
+    guard.load(100, np.arange(float(count)))
+    guard.lookout.always = False
+    none = np.full(count, -1)
+    stepper.take(Plan(np.arange(count), none, none))
+    assert guard.stopped == {0: 105}
+    assert only(guard).kind == "runaway"
 
 
 def test_a_measured_track_that_is_never_reached_is_refused(tmp_path):

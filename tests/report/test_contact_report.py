@@ -15,6 +15,8 @@ from tiengine.contact.conicity import equivalent_conicity, rolling_radius_differ
 from tiengine.contact.profile import load_profile
 from tiengine.contact.table import ContactSettings, WheelRailPair
 from tiengine.report.contact_report import contact_report, draw
+from tiengine.scenario.profile_part import build_profile
+from validation.cases.klingel import cone, round_head
 
 PRINTED = 0.0350
 """LMA on CHN60 at 3 mm, another program's digits (tests/contact/test_conicity.py)."""
@@ -86,6 +88,10 @@ def test_figure_names_its_axes(tmp_path, report, suffix):
         (["LMX", "CHN60"], "wheel profile 'LMX': neither a file nor a preset; did you mean 'LMA'?"),
         (["LMA", "CHN60", "--gauge", "-1"], "contact.gauge = -1.0: must be greater than 0 m"),
         (["LMA", "CHN60", "--largest", "0.001"], "largest shift = 1 mm: must be 3 to 20 mm"),
+        (["LMA", "CHN60", "--left-larger", "0.011"], "left wheel larger by 11 mm in radius: must be at most 10 mm"),
+        (["LMA", "CHN60", "--left-larger", "nan"], "left wheel larger by nan mm in radius"),
+        (["LMA", "CHN60", "--left-wheel", "LMX"], "wheel profile 'LMX': neither a file nor a preset"),
+        (["LMA", "CHN60", "--left-larger", "1e-3", "--method", "en15302"], "method = 'en15302': must be 'harmonic'"),
         (["LMA", "CHN60", "-o", "figure.abc"], "output = 'figure.abc': its suffix must be one of"),
         (["LMA", "CHN60", "-o", "no/such/figure.png"], "output = 'no/such/figure.png': there is no folder 'no/such'"),
     ],
@@ -98,3 +104,41 @@ def test_bad_input_is_one_line(tmp_path, monkeypatch, arguments, message):
     assert re.fullmatch(r"error: [^\n]+\n", result.stderr)
     assert message in result.stderr
     assert list(Path.cwd().iterdir()) == []
+
+
+def test_sides_stated_alike_are_the_symmetric_wheelset(report):
+    """About the mean shift, here 0; shifts in between are interpolated every 10 um, which moves conicity by 1e-4."""
+    same = contact_report(report.pair.wheel, report.pair.rail, report.pair.settings, left_wheel=report.pair.wheel)
+    assert same.rolling_shift == pytest.approx(0.0, abs=1e-8)
+    inside = report.amplitude < 7e-3  # wider waves leave the shifts considered
+    assert same.conicity[inside] == pytest.approx(report.conicity[inside], rel=1e-3)
+    assert same.radius_difference == pytest.approx(report.radius_difference, abs=1e-15)
+
+
+@pytest.mark.parametrize("larger", [4e-5, -4e-5, 1e-4])
+def test_cones_of_unequal_radii_roll_beside_the_middle(larger):
+    """They roll straight with a level axle, where the slope makes up for the difference: at larger/(2 slope).
+
+    About there the conicity is that of equal radii, which includes the roll.
+    """
+    wheel, rail = (build_profile(table, "a", kind) for table, kind in ((cone(0.025), "wheel"), (round_head(), "rail")))
+    equal = contact_report(wheel, rail, ContactSettings()).reference_conicity
+    found = contact_report(wheel, rail, ContactSettings(), larger_left=larger)
+    assert found.rolling_shift == pytest.approx(larger / (2.0 * 0.025), rel=1e-6)
+    assert found.reference_conicity == pytest.approx(equal, rel=2e-3)
+    mirrored = contact_report(wheel, rail, ContactSettings(), larger_left=-larger)
+    assert mirrored.rolling_shift == pytest.approx(-found.rolling_shift, rel=1e-6)
+
+
+def test_left_side_on_the_command_line(tmp_path):
+    """Mirrored, S1002 on the left shifts the wheelset to the other side; the figure shows both sides."""
+    left = json.loads(call("LMA", "CHN60", "--left-wheel", "S1002", "--left-rail", "60E1", "--json").stdout)
+    right = json.loads(call("S1002", "60E1", "--left-wheel", "LMA", "--left-rail", "CHN60", "--json").stdout)
+    assert (left["left_wheel"], left["left_rail"], left["wheel"]) == ("S1002", "60E1", "LMA")
+    assert left["rolling_shift"] == pytest.approx(-right["rolling_shift"], abs=1e-7)
+    assert left["conicity"][5] == pytest.approx(right["conicity"][5], rel=1e-6)
+    path = tmp_path / "a.svg"
+    result = call("LMA", "CHN60", "--left-larger", 2e-4, "-o", path)
+    assert result.exit_code == 0, result.output
+    assert re.search(r"equal rolling radii at +2\.\d+ mm", result.stdout)
+    assert b"<!-- left wheel, drawn above its rail" in path.read_bytes()

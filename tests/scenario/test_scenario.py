@@ -258,6 +258,17 @@ BAD = {
     "train.wheel_profile=LMB": "train.wheel_profile = 'LMB': no such preset; did you mean 'LMA'?",
     "track.rail_profile=no/such.csv": "track.rail_profile = 'no/such.csv': no such file",
     "track.rail={like = 'CHN6'}": "track.rail = 'CHN6': no such preset; did you mean 'CHN60'?",
+    # single wheels and rails
+    "train.wheel_profiles=[{side='left'}]": "train.wheel_profiles: must state profile, radius or radius_difference",
+    "train.wheel_profiles=[{radius=0.43, radius_difference=0}]": "wheel_profiles.radius = 0.43: must be left out",
+    "train.wheel_profiles=[{radius=0.5}]": "train.wheel_profiles[0].radius = 0.5: must be within 5 % of the vehicle's",
+    "train.wheel_profiles=[{radius_difference=-0.03}]": "[0].radius_difference = -0.03: must be within 5 % of",
+    "train.wheel_profiles=[{side='left', radius_difference=0.011}]": "wheels of wheelset 1 have radii 0.441 and 0.43 m",
+    "train.wheel_profiles=[{wheelsets=[5], radius=0.43}]": "[0].wheelsets = [5]: must be numbers from 1 to 4",
+    "train.wheel_profiles=[{vehicles=[2], radius=0.43}]": "[0].vehicles = [2]: must be numbers from 1 to 1",
+    "train.wheel_profiles=[{wheelsets=[], radius=0.43}]": "train.wheel_profiles[0].wheelsets = []: must be numbers",
+    "train.wheel_profiles=[{profile='LMB'}]": "[0].profile = 'LMB': no such preset; did you mean 'LMA'?",
+    "track.rail_profile_left=CHN61": "track.rail_profile_left = 'CHN61': no such preset; did you mean 'CHN60'?",
     # overrides themselves
     "train.speed_kmh": "--set 'train.speed_kmh': must be KEY=VALUE",
     "train.speed_kmh.a=3": "--set train.speed_kmh.a: 'a' lies below a value that is not a table",

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from threadpoolctl import threadpool_info
 
 from tiengine import result as results
 from tiengine.cli.commands import main
@@ -26,6 +27,7 @@ from tiengine.result_files.checkpoint import checkpoint_paths
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.simulation import simulate
 from tiengine.simulation.tasks import plan
+from tiengine.simulation.worker import distribute, send_task
 
 SHORT = {
     "train.distance": 3.0,
@@ -280,6 +282,25 @@ def test_same_bits_from_three_workers():
         for train in range(6):
             assert_same_bits(apart, mixed(), train)
     assert multiprocessing.active_children() == []
+
+
+def report_threads(task: Any, saved: Any, stop: Any, send: Any) -> None:
+    """Send the threads of every BLAS library with which a worker's trains are computed."""
+    from tiengine.simulation import stream
+
+    def threads(*_: Any, **__: Any) -> Any:
+        yield {pool["filepath"]: pool["num_threads"] for pool in threadpool_info()}
+
+    stream.run_task = threads  # the import above has loaded what the engine needs
+    send_task(task, saved, stop, send, public=False, every=1.0)
+
+
+def test_every_library_of_a_worker_computes_on_one_thread(monkeypatch: pytest.MonkeyPatch):
+    """SciPy's BLAS is loaded with the engine, after the worker has begun; two threads round in another way than one."""
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    (found,) = distribute(plan(ensemble(size=1)), 1, {}, run=report_threads)
+    assert len(found) >= 2  # NumPy's and SciPy's
+    assert set(found.values()) == {1}
 
 
 def test_the_trains_of_a_killed_worker_are_begun_again():

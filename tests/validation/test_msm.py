@@ -140,3 +140,17 @@ def test_two_patches_act_alike():
 def test_what_the_full_length_model_has_not_is_refused(override, said):
     with pytest.raises(InputError, match=said):
         run_full_length(load_scenario("paper", [*SHORT, override]), FullLength(60.0))
+
+
+@pytest.mark.slow
+def test_wheels_and_rails_that_differ_act_alike():
+    """Radii, profiles and rails of their own in both models: 1 % of the peak, as for rails that are alike."""
+    words = (
+        "train.wheel_profiles=[{wheelsets=[1], side='right', radius_difference=-3e-4},"
+        " {wheelsets=[3], profile='S1002'}]",
+        "track.rail_profile_left='60E1'",
+    )
+    for name in ("vertical_force", "lateral_force"):
+        full, window, alike = (x[name] for x in (_full(*words), _window(*words), _window()))
+        assert np.abs(full - window).max() < 1e-2 * np.abs(full).max()
+        assert np.abs(window - alike).max() > 1e-2 * np.abs(full).max()

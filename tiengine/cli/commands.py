@@ -6,9 +6,11 @@ import Taichi, so that the others start fast.
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import signal
+import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -30,6 +32,9 @@ class _Commands(click.Group):
 
     def invoke(self, context: click.Context) -> Any:
         """Run a command."""
+        if sys.stdout is None or sys.stderr is None:  # closed by whoever started this process
+            nowhere = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - until the process ends
+            sys.stdout, sys.stderr = sys.stdout or nowhere, sys.stderr or nowhere
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("always", InputNote)
@@ -46,6 +51,11 @@ class _Commands(click.Group):
         except InputError as error:
             click.echo(f"error: {' '.join(str(error).split())}", err=True)
             context.exit(2)
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EIO, errno.EDQUOT) or error.filename is not None:
+                raise
+            click.echo(f"error: standard output: {error.strerror}", err=True)
+            context.exit(1)
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -122,6 +132,7 @@ def profile(
 @click.option("--half-spacing", type=float, default=0.7465, show_default=True, help="Of the tape circles [m].")
 @click.option("--wheel-radius", type=float, default=0.43, show_default=True, help="At the tape circle [m].")
 @click.option("--tape-circle", type=float, help="Distance of the tape circle outward from the wheel file's y = 0 [m].")
+@click.option("--rail-axis", type=float, help="The rail file's y at the axis of an upright rail [m].")
 @click.option("--allow-kinks", is_flag=True, help="Accept kinks where wheel and rail can touch.")
 @click.option("--mirror-rail/--no-mirror-rail", default=None, help="The rail's gauge face is at positive y, or not.")
 @click.option("--smoothing", type=click.FloatRange(0.0, 5e-3), help="Of points; 0.0005 for measured profiles [m].")
@@ -133,6 +144,9 @@ def profile(
     help="Equivalent conicity by harmonic linearisation, or by the integral of EN 15302 (without roll).",
 )
 @click.option("--largest", type=float, default=0.008, show_default=True, help="Largest shift [m].")
+@click.option("--left-wheel", help="Profile of the left wheel if another, preset or file.")
+@click.option("--left-rail", help="Profile of the left rail if another, preset or file.")
+@click.option("--left-larger", type=float, default=0.0, help="Radius of the left wheel less that of the right one [m].")
 def contact(
     wheel: str,
     rail: str,
@@ -140,16 +154,23 @@ def contact(
     as_json: bool,
     canted: bool | None,
     tape_circle: float | None,
+    rail_axis: float | None,
     allow_kinks: bool,
     mirror_rail: bool | None,
     smoothing: float | None,
     largest: float,
     method: Literal["harmonic", "en15302"],
+    left_wheel: str | None,
+    left_rail: str | None,
+    left_larger: float,
     **placement: float,
 ) -> None:
-    """Evaluate the contact geometry of WHEEL and RAIL, presets or files: rolling radii, conicity, contact points."""
+    """Evaluate the contact geometry of WHEEL and RAIL, presets or files: rolling radii, conicity, contact points.
+
+    With one of the options --left-..., WHEEL and RAIL are those of the right side.
+    """
     from tiengine.contact.point_list import ROUNDING_LENGTH
-    from tiengine.contact.profile import load_profile
+    from tiengine.contact.profile import Profile, load_profile
     from tiengine.contact.table import ContactSettings
     from tiengine.parameters.quantity import build
     from tiengine.report.contact_report import contact_report, draw
@@ -160,12 +181,30 @@ def contact(
         raise InputError(f"smoothing = {length}: must be a finite number")
     if output is not None:
         check_output(output, force=True)
+
+    def wheel_of(name: str) -> Profile:
+        return load_profile(name, "wheel", smoothing=length, tape_circle=tape_circle, allow_kinks=allow_kinks)
+
+    def rail_of(name: str) -> Profile:
+        return load_profile(
+            name,
+            "rail",
+            smoothing=length,
+            has_cant=canted,
+            mirror=mirror_rail,
+            allow_kinks=allow_kinks,
+            rail_axis=rail_axis,
+        )
+
     report = contact_report(
-        load_profile(wheel, "wheel", smoothing=length, tape_circle=tape_circle, allow_kinks=allow_kinks),
-        load_profile(rail, "rail", smoothing=length, has_cant=canted, mirror=mirror_rail, allow_kinks=allow_kinks),
+        wheel_of(wheel),
+        rail_of(rail),
         build(ContactSettings, placement, "contact"),
         largest,
         method,
+        left_wheel=wheel_of(left_wheel) if left_wheel else None,
+        left_rail=rail_of(left_rail) if left_rail else None,
+        larger_left=left_larger,
     )
     if output is not None:
         draw(report, output)

@@ -2,6 +2,7 @@
 
 The wheelset is shifted by y on straight track; its roll phi follows from both wheels touching,
 2 b0 phi = g(u, phi) - g(-u, -phi) with u = y - r0 phi (sigma = +1 right, -1 left). EN 15302 neglects the roll.
+With sides that differ, either has its own g and radius, and r_L - r_R adds to the right-hand side.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from tiengine.contact.table import WheelRailPair
 from tiengine.parameters.arrays import Reals
 
 __all__ = [
+    "UnequalSides",
     "WheelsetPosition",
     "en15302_conicity",
     "equivalent_conicity",
@@ -46,25 +48,43 @@ class WheelsetPosition:
     left: Contacts
 
 
-def wheelset_position(pair: WheelRailPair, y: ArrayLike) -> WheelsetPosition:
+@dataclass(frozen=True, eq=False)
+class UnequalSides:
+    """A wheelset whose profiles, rails or radii differ from left to right.
+
+    Attributes:
+        left, right: Pairs of either side, with the same mean radius.
+        larger_left: Radius of the left wheel less that of the right one [m].
+    """
+
+    left: WheelRailPair
+    right: WheelRailPair
+    larger_left: float = 0.0
+
+
+Sides = WheelRailPair | UnequalSides
+
+
+def wheelset_position(pair: Sides, y: ArrayLike) -> WheelsetPosition:
     """Roll and contacts of a wheelset shifted to the right.
 
     Args:
-        pair: Wheel and rail.
+        pair: Wheel and rail, or those of either side.
         y: Shifts of the wheelset's centre to the right [m], shape (n,).
 
     Returns:
         The position, arrays of shape (n,).
     """
     shift = np.atleast_1d(np.asarray(y, dtype=np.float64))
-    b0, r0 = pair.settings.half_spacing, pair.settings.wheel_radius
+    _, right_pair, larger_left = _sides(pair)
+    b0, r0 = right_pair.settings.half_spacing, right_pair.settings.wheel_radius
     roll = np.zeros_like(shift)
     low, high = np.full_like(shift, -STEEPEST_ROLL), np.full_like(shift, STEEPEST_ROLL)
     active = np.arange(shift.size)
     for _ in range(60):
         phi = roll[active]
         right, left = _both_contacts(pair, shift[active], phi)
-        error = 2.0 * b0 * phi - (right.gap - left.gap)
+        error = 2.0 * b0 * phi - (right.gap - left.gap) - larger_left
         # d gap/d u = -tan gamma, d gap/d alpha = -s_w
         slope = 2.0 * b0 - r0 * (right.tan_gamma + left.tan_gamma) + right.s_w + left.s_w
         low[active] = np.where(error < 0.0, phi, low[active])
@@ -78,16 +98,23 @@ def wheelset_position(pair: WheelRailPair, y: ArrayLike) -> WheelsetPosition:
     return WheelsetPosition(roll, *_both_contacts(pair, shift, roll))
 
 
-def _both_contacts(pair: WheelRailPair, y: Reals, roll: Reals) -> tuple[Contacts, Contacts]:
+def _sides(pair: Sides) -> tuple[WheelRailPair, WheelRailPair, float]:
+    """Left and right pair, and by how much the left radius is larger [m]."""
+    return (pair, pair, 0.0) if isinstance(pair, WheelRailPair) else (pair.left, pair.right, pair.larger_left)
+
+
+def _both_contacts(pair: Sides, y: Reals, roll: Reals) -> tuple[Contacts, Contacts]:
     """Contacts of the right and the left wheel."""
-    u = y - pair.settings.wheel_radius * roll
-    return pair.contacts(u, roll), pair.contacts(-u, -roll)
+    left, right, larger_left = _sides(pair)
+    u_right = y - (right.settings.wheel_radius - 0.5 * larger_left) * roll
+    u_left = y - (left.settings.wheel_radius + 0.5 * larger_left) * roll
+    return right.contacts(u_right, roll), left.contacts(-u_left, -roll)
 
 
-def rolling_radius_difference(pair: WheelRailPair, y: ArrayLike) -> Reals:
+def rolling_radius_difference(pair: Sides, y: ArrayLike) -> Reals:
     """Right minus left rolling radius [m] of a wheelset shifted by y to the right [m], shape (n,)."""
     position = wheelset_position(pair, y)
-    return position.right.dz_w - position.left.dz_w
+    return position.right.dz_w - position.left.dz_w - _sides(pair)[2]
 
 
 def equivalent_conicity(pair: WheelRailPair, amplitude: ArrayLike, phases: int = 256) -> Reals:

@@ -66,6 +66,9 @@ class CompliantTrack:
         under: Reals = np.einsum("wrfk,bk->bwrf", self._compliance, flat)
         return under
 
+    def settled(self, force: Reals) -> None:
+        """See :class:`tiengine.engine.steady.Track`; the bed of a track with sines transmits tension."""
+
     def motion(self, force: Reals) -> tuple[Reals, Reals, Reals]:
         """See :class:`tiengine.engine.steady.Track`."""
         n = self.model.ingredients.modes

@@ -32,6 +32,7 @@ FORCE_TOLERANCE = 1e-4  # N: a billionth of a wheel load
 EASY_FRICTION = 0.3  # from the guess Newton's method is known to converge
 FRICTION_RATIO = 1.5  # from one friction to the next, where the creep forces change by a few per cent
 FIRST_SHARE, SMALLEST_SHARE = 0.25, 1.0 / 256.0  # of the given loads: a step towards them
+SETTLING = 6  # times that the bed may carry elsewhere; what is left is a newton at the edge of a contact
 NUDGE_COORDINATE = 1e-8  # m, rad
 NUDGE_RATE = 1e-6  # rad/s
 NUDGE_FORCE = 1.0  # N
@@ -80,10 +81,11 @@ def evaluate_contact(
     )
     kernels.wheel_forces(
         patches,
+        int(model.ingredients.contacts is not None),
         V,
         int(model.dims[at.CROSS_LEVEL_ROLLS]),
         model.constants,
-        model.ingredients.contact.values,
+        model.ingredients.contact_values,
         model.wheel,
         np.ascontiguousarray(np.broadcast_to(irregularity, (B, W, at.N_IRREGULARITY))),
         np.ascontiguousarray(wheelset_u),
@@ -114,6 +116,13 @@ def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 
     given = _given(model, X, V, V_rate)
     problem = _Problem(model, track, V, V_rate, given)
     y = problem.solve()
+    for _ in range(SETTLING):
+        settled = track.settled(problem.split(y[None])[2][0])
+        if settled is None:
+            break
+        track = settled
+        problem = _Problem(model, track, V, V_rate, given)
+        y = problem.solve()
     x, rates, rail_force = problem.split(y[None])
     state.put(DISPLACEMENT, "vehicles", x[0])
     state.put(VELOCITY, "vehicles", problem.spread(rates[0]))
@@ -156,17 +165,31 @@ class _Problem:
     """Residual of steady rolling: train (n), then contact forces on the rails (6 W)."""
 
     def __init__(self, model: Model, track: Track, V: float, V_rate: float, given: GivenLoads) -> None:
-        self.model, self.track, self.V = model, track, V
+        self.model, self.track, self.V, self._share = model, track, V, 1.0
         self.train = model.ingredients.train
         self.pitch = self.train.wheelset_dof[:, 3]
         self._own_load, self._given = self.train.gravity + V_rate * self.train.acceleration_force, given
+        self._wheel = model.wheel
         self._give(1.0)
 
     def _give(self, share: float) -> None:
-        """Let a share of the given loads act."""
+        """Let a share of the given loads act, and of the differences between the radii of a wheelset's wheels."""
         given = self._given
+        if self.model.ingredients.contacts is not None:
+            wheel = self._wheel.copy()
+            less = (share - 1.0) * self._raised
+            wheel[:, at.RADIUS_LEFT : at.RADIUS_RIGHT + 1] += less
+            wheel[:, at.LARGER_LEFT : at.LARGER_RIGHT + 1] += less
+            self.model, self._share = replace(self.model, wheel=wheel), share
         self.load = self._own_load + share * given.force[0, 0]
         self.elongation, self.frame_rate = share * given.elongation[0, 0], share * given.frame_rate[0, 0]
+
+    @property
+    def _raised(self) -> NDArray[np.float64]:
+        """Radii of the wheels less the means of their wheelsets [m], shape (W, 2); zero where all wheels are alike."""
+        if self.model.ingredients.contacts is None:
+            return np.zeros((len(self.pitch), 2))
+        return self._wheel[:, at.RADIUS_LEFT : at.RADIUS_RIGHT + 1] - self._wheel[:, [at.NOMINAL_RADIUS]]
 
     def split(self, y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Coordinates (B, n), pitch rates (B, W), forces on the rails (B, W, 2, 3)."""
@@ -240,7 +263,8 @@ class _Problem:
         apart, left = self._newton(self._guess(mean=False))
         if left < FORCE_TOLERANCE:
             return apart
-        if self.model.ingredients.given and (found := self._approach()) is not None:
+        differs = self.model.ingredients.contacts is not None
+        if (self.model.ingredients.given or differs) and (found := self._approach()) is not None:
             return found
         reached, y = np.inf, self._guess()
         steps = 1 + max(int(np.ceil(np.log(EASY_FRICTION / wanted) / np.log(FRICTION_RATIO))), 0)
@@ -262,9 +286,10 @@ class _Problem:
         )
 
     def _approach(self) -> NDArray[np.float64] | None:
-        """Newton's method from straight track on, the given loads growing by steps that are halved where it fails.
+        """Newton's method from straight track and equal radii on, both growing by steps that are halved where it fails.
 
-        In a sharp curve the flanges lie against the rails, where the guess, which is made for the treads, is of no use.
+        In a sharp curve, or with wheels of different radii, flanges lie against the rails, where the guess, which is
+        made for the treads, is of no use.
         """
         self._give(0.0)
         y, size = self._newton(self._guess())
@@ -321,6 +346,7 @@ class _Problem:
         sinking = self.track.under_wheels(force[None])[0, :, :, 0]
         common = sinking.mean(axis=1).mean()
         own = np.zeros_like(sinking) if mean else sinking - common
+        own = own - self._share * self._raised
         for w, b0 in enumerate(train.half_spacing):
             K[dof[w, 1], dof[w, 1]] += 2.0 * stiffness
             K[dof[w, 2], dof[w, 2]] += 2.0 * stiffness * b0**2

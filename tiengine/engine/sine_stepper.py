@@ -188,7 +188,7 @@ class SineStepper(Stepper):
 
     def _bind_forces(self, tick: NDArray[np.int32], number: int) -> Launch:
         m, s, k, b, chunk = self.model, self.state, self.scratch, self.model.blocks, self.chunk
-        train, table = self.ingredients.train, self.ingredients.contact.values
+        train, table = self.ingredients.train, self.ingredients.contact_values
         return self._launch(
             kernels.forces_and_contact, tick, _ITERATE if number else _PREDICTED, m.dims, m.constants, chunk.clock,
             m.stiffness, k.drift, s.seat_scale, k.seat_shape, k.rail_pull, k.slab_pull, self.loads.array,
@@ -196,7 +196,7 @@ class SineStepper(Stepper):
             train.element_linear, train.element_table, table, chunk.irregularity, m.wheel_shape, b.wheelset_compliance,
             b.rail_coupling, b.rail_answer, b.vehicle_answer, s.motion, s.seat_force, k.slab_force, k.rail_predicted,
             s.contact, s.force, s.wheelset_force, s.rail_force, s.iterations, chunk.wheel,
-            static=(self.ingredients.contact.patches,),
+            static=(self.ingredients.contact.patches, int(self.ingredients.contacts is not None)),
         )  # fmt: skip
 
     def _bind_mortar(self, number: int) -> Launch:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.engine.load_rows import LoadRows
+from tiengine.engine.lookout import Lookout
 from tiengine.engine.spline_arrays import SplineArrays
 from tiengine.engine.spline_tables import RailTables, SeatTables, SlabTables, Spans
 from tiengine.engine.vector_mode import VectorLaunch
@@ -44,7 +45,7 @@ class Contact:
 
     Attributes:
         wheel: Numbers of each wheelset, shape (W, N_WHEEL_NUMBERS).
-        table: Contact geometry, shape (n_u, n_alpha, N_TABLE patches).
+        table: Contact geometry, shape (tables n_u, n_alpha, N_TABLE patches).
         contact: Contact states, shape (B, W, CONTACT_ROWS, N_CONTACT).
         force: N, Fx, Fy, Mz on the wheels, shape (B, W, CONTACT_ROWS, 4).
         wheelset_force: On y, z, roll, pitch, yaw, shape (B, W, 5).
@@ -65,6 +66,11 @@ class Contact:
         """Patches a wheel can have."""
         return int(self.table.shape[2]) // layout.N_TABLE
 
+    @property
+    def own(self) -> int:
+        """1 if wheels have radii and contact tables of their own."""
+        return int(self.wheel[0, layout.RADIUS_LEFT] > 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Bed:
@@ -72,7 +78,8 @@ class Bed:
 
     Attributes:
         index, shape, weight: Quadrature.
-        factor, rest: Factors and pressures at rest by design.
+        factor: Factors by design.
+        rest: Pressures at rest of the slab in each slot [Pa], shape (slots, n_el, n_q); set as slabs enter.
         lateral_K, lateral_C: Lateral bed by design, shape (designs, 2, 2).
         numbers: k_m, c_m, explicit, no tension.
         pressure: Largest and smallest pressure of each slab [Pa], shape (B, slots, 2); filled.
@@ -95,6 +102,8 @@ class SplineStep:
     Attributes:
         state: What is advanced, in place.
         job: First step, number of steps, stages (``spline_layout``) of the next launch.
+        limits: Limits of a sound state, see ``spline_layout``, shape (N_LIMITS,).
+        one_chunk: Whether all trains are in one chunk, so that a launch can stop between two steps.
         record: Row of the bodies' record that each step fills, -1 for none, shape (steps,).
         launch: The bound kernel; ``launch.vector_mode`` tells how it was compiled.
     """
@@ -118,6 +127,7 @@ class SplineStep:
         slab_record: Floats,
         bed: Bed,
         loads: LoadRows,
+        slab_inertia: Floats | None = None,
     ):
         """Bind.
 
@@ -132,14 +142,16 @@ class SplineStep:
             slabs: Tables of the slabs.
             suspension: Nonlinear elements.
             contact: Arrays of the contact.
-            clock: Window at the end of each step, shape (steps, N_CLOCK).
+            clock: Window at the end of each step, shape (steps, N_CLOCK); loads of rails follow where the ground moves.
             irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
             wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL_RECORD).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
             slab_record: Displacement, velocity, acceleration of every slab coordinate where the bodies are recorded,
                 vectors, shape (B rows groups N 3, 8).
             bed: Bed, read if MORTAR_MODE is not 0.
-            loads: Loads of the cars.
+            loads: Loads of cars and slabs.
+            slab_inertia: Inertia force of a slab's coordinates by unit acceleration of the ground, shape (N,), where it
+                moves in time.
         """
         cars = state.cars
         size = np.zeros(at.N_SIZE, dtype=np.int32)
@@ -148,14 +160,21 @@ class SplineStep:
         size[at.GROUPS] = -(-int(dims[layout.SLOTS]) // 8)
         size[at.CARS], size[at.CAR_DOFS], size[at.ELEMENTS] = len(cars.car), cars.dofs, len(suspension.kind)
         size[at.LOAD_STEP], size[at.LOAD_TRAIN] = loads.step // 8, loads.train // 8
+        size[at.LOAD_GROUND] = loads.ground // 8
+        moving = slab_inertia is not None
+        slab_rows = np.zeros((4, slabs.dofs))  # the last is read where the ground moves
+        slab_rows[3] = slab_inertia if slab_inertia is not None else 0.0
         car_load = loads.array.reshape(-1, 8)
         self.state, self.size = state, size
-        self.job = np.array([0, 1, at.ALL_STAGES], dtype=np.int32)
+        self.job = np.zeros(at.N_JOB, dtype=np.int32)
+        self.job[at.STEPS], self.job[at.STAGES] = 1, at.ALL_STAGES
+        self.limits, self._stopped = np.zeros(at.N_LIMITS), np.full(1, -1, dtype=np.int32)
+        self.one_chunk = bool(size[at.CHUNKS] == 1)
         self.record = np.full(len(clock), -1, dtype=np.int32)
         arrays = (
-            self.job, self.record, size, dims, constants, clock,
+            self.job, self.limits, self._stopped, self.record, size, dims, constants, clock,
             state.rail, rails.coefficient,
-            state.seat, seats.point, spans.span, seats.place, seats.shape,
+            state.seat, state.seat_play, seats.point, spans.span, seats.place, seats.shape,
             state.slab, state.slab_seat, state.slab_design, slab_record, slabs.coefficient,
             slabs.seat_index, slabs.seat_shape, slabs.seat_x,
             state.car, cars.columns, car_load, cars.columns_start, cars.vehicle_place, cars.wheelset_place,
@@ -165,14 +184,23 @@ class SplineStep:
             irregularity, cars.wheelset_compliance, rails.coupling, contact.contact, contact.force,
             contact.wheelset_force, contact.rail_force, contact.iterations, wheel_record,
             body_record, bed.index, bed.shape, bed.weight, bed.factor, bed.rest, bed.lateral_K, bed.lateral_C,
-            bed.numbers, np.zeros((3, slabs.dofs)), bed.pressure,
+            bed.numbers, slab_rows, bed.pressure,
         )  # fmt: skip
-        vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, slab_record,
-                   state.car, cars.columns, car_load)  # fmt: skip
+        vectors = (state.rail, state.seat, state.seat_play, state.under, state.slab, state.slab_seat,
+                   state.slab_design, slab_record, state.car, cars.columns, car_load)  # fmt: skip
         shaped = int(irregularity.shape[-1] > layout.N_IRREGULARITY)
         self.launch = VectorLaunch(
             step_kernel,
-            (state.lanes, slabs.half_width, cars.blocks, contact.patches, shaped),
+            (
+                state.lanes,
+                slabs.half_width,
+                cars.blocks,
+                contact.patches,
+                shaped,
+                int(moving),
+                contact.own,
+                int(state.some_hang),
+            ),
             arrays,
             frozenset(i for i, array in enumerate(arrays) if any(array is vector for vector in vectors)),
         )
@@ -181,3 +209,20 @@ class SplineStep:
         """Advance to the end of step ``first + steps - 1`` of the chunk; no seat or slab may enter within."""
         self.job[at.FIRST_STEP], self.job[at.STEPS] = first, steps
         self.launch()
+
+    def up_to_check(self, first: int, steps: int, lookout: Lookout) -> tuple[int, bool]:
+        """Advance likewise, but not beyond a step after which a guard must check the state.
+
+        Args:
+            first: Row of the first step.
+            steps: Steps at most.
+            lookout: Where to stop; its limits must be in :attr:`limits`.
+
+        Returns:
+            Row of the next step, and whether the state must be checked before it.
+        """
+        self.job[at.LOOK_EVERY], self.job[at.STEPS_BEFORE] = lookout.every, lookout.steps_before
+        self.job[at.LOOK_ALWAYS], self._stopped[0] = lookout.always, -1
+        self(first, steps)
+        stopped, self._stopped[0], self.job[at.LOOK_EVERY] = int(self._stopped[0]), -1, 0
+        return (stopped + 1, True) if stopped >= 0 else (first + steps, False)

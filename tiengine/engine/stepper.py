@@ -15,6 +15,7 @@ import numpy as np
 
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.load_rows import LoadRows
+from tiengine.engine.lookout import Lookout
 from tiengine.engine.state import State
 from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
@@ -145,6 +146,17 @@ class Stepper(ABC):
         self.watchers.insert(place, (name, call))
         self.due.insert(place, due)
 
+    def look_out(self, lookout: Lookout) -> bool:
+        """Check the state from time to time within the steps that are taken at once.
+
+        Args:
+            lookout: Says when, and what is to be called.
+
+        Returns:
+            Whether this kind of step can do it; if not, a guard must be a watcher.
+        """
+        return False
+
     def time_stages(self, mark: Callable[[str], object] | None) -> None:
         """Let a clock be read within the coming steps, or no longer.
 
@@ -154,7 +166,10 @@ class Stepper(ABC):
         """
         self._mark = mark
 
-    def load(self, X: Reals, V: Reals, V_rate: Reals, irregularity: Reals, given: GivenLoads | None = None) -> None:
+    def load(
+        self, X: Reals, V: Reals, V_rate: Reals, irregularity: Reals, given: GivenLoads | None = None,
+        time: Reals | None = None,
+    ) -> None:  # fmt: skip
         """Fill the chunk for the coming steps.
 
         Args:
@@ -163,9 +178,10 @@ class Stepper(ABC):
             V_rate: Its rate [m/s^2].
             irregularity: Track channels, shape (B, steps, W, channels).
             given: Loads of the train beyond gravity; None where it has none.
+            time: Ends of the steps since the start of the run [s], needed where the ground moves.
         """
         clock = window_clock(self.ingredients.slab, X, V, V_rate, self.ingredients.seat_reach)
-        self.chunk.clock[: len(X)] = clock
+        self.chunk.clock[: len(X), : at.N_CLOCK] = clock
         self.chunk.irregularity[:, : len(X)] = irregularity
         if given is not None:
             self.loads.fill(given, len(X))

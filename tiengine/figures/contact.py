@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,9 +47,10 @@ def draw(train: Train) -> Figure:
     two = train.scenario.contact.patches == 2
     samples = train.samples("patch" if two else "wheel", "share" if two else "normal_force", *names)
     parts, cant = train.scenario.parts, train.scenario.track.cant
-    profiles = {"wheel": parts.wheel, "rail": parts.rail_profile.canted(cant)}
-    counts = {name: _Histogram(profiles[body].span) for name, body in names.items()}
-    seconds = {name: _Histogram(profiles[body].span) for name, body in names.items()} if two else {}
+    rails = parts.rail_profiles[0].canted(cant), parts.rail_profiles[1].canted(cant)
+    drawn = {"wheel": _Drawn.of(parts.wheel_profiles), "rail": _Drawn.of([rails])}
+    counts = {name: _Histogram(drawn[body].span) for name, body in names.items()}
+    seconds = {name: _Histogram(drawn[body].span) for name, body in names.items()} if two else {}
     begin = first_samples(train, samples)
     sample = int(begin.min())
     for _, channels in samples.slices(sample):
@@ -74,15 +77,48 @@ def draw(train: Train) -> Figure:
         second = seconds.get(name)
         _histograms(above, counts[name], second)
         origin = "the tape circle" if body == "wheel" else "the crown"
-        _profile(below, profiles[body], counts[name], second, f"outward from {origin} of the {body} [mm]")
+        _profiles(below, drawn[body], counts[name], second, f"outward from {origin} of the {body} [mm]")
         below.sharex(above)
-        above.set_xlim(*(1e3 * edge for edge in counts[name].shown(profiles[body].span)))
+        above.set_xlim(*(1e3 * edge for edge in counts[name].shown(drawn[body].span)))
         above.set(
-            title=plain(f"{body.capitalize()}: {profiles[body].name}"),
+            title=plain(f"{body.capitalize()}: {drawn[body].names}"),
             ylabel=f"share of {'patches' if two else 'time'}\n[% in {1e3 * BIN:g} mm]",
         )
     axes[0].legend(loc="upper right")
     return figure
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """Profiles of wheels or rails.
+
+    Attributes:
+        sides: Profiles on which the left and the right contacts are marked: of the first wheelset, or of the rails.
+        different: All different profiles.
+    """
+
+    sides: tuple[Profile, Profile]
+    different: tuple[Profile, ...]
+
+    @classmethod
+    def of(cls, pairs: Sequence[tuple[Profile, Profile]]) -> _Drawn:
+        """Profiles from those of the left and the right side, pair by pair."""
+        different = {(each.name, each.y.tobytes(), each.z.tobytes()): each for pair in pairs for each in pair}
+        return cls(pairs[0], tuple(different.values()))
+
+    @property
+    def names(self) -> str:
+        """Names of all profiles."""
+        left, right = self.sides
+        if left.name != right.name and len(self.different) == 2:
+            return f"{left.name} on the left, {right.name} on the right"
+        return ", ".join(dict.fromkeys(each.name for each in self.different))
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Ends of all profiles [m]."""
+        ends = np.array([each.span for each in self.different])
+        return float(ends[:, 0].min()), float(ends[:, 1].max())
 
 
 class _Histogram:
@@ -140,15 +176,19 @@ def _histograms(axes: Axes, histogram: _Histogram, second: _Histogram | None) ->
     axes.set_ylim(bottom=0.0)
 
 
-def _profile(axes: Axes, profile: Profile, histogram: _Histogram, second: _Histogram | None, abscissa: str) -> None:
-    """Draw the profile around its touched part, which is bold; triangles mark the medians, open ones second patches."""
+def _profiles(axes: Axes, drawn: _Drawn, histogram: _Histogram, second: _Histogram | None, abscissa: str) -> None:
+    """Draw profiles around their touched part, which is bold; triangles mark the medians, open ones second patches."""
     low, high = histogram.touched
-    y = np.linspace(*histogram.shown(profile.span), 800)
-    inside = (y >= low) & (y <= high)
-    axes.plot(1e3 * y, 1e3 * profile.height(y), color=BLACK, linewidth=0.8)
-    axes.plot(1e3 * y[inside], 1e3 * profile.height(y[inside]), color=BLACK, linewidth=2.2)
+    for i, profile in enumerate(drawn.different):
+        y = np.linspace(*histogram.shown(profile.span), 800)
+        inside = (y >= low) & (y <= high)
+        line: dict[str, Any] = {"color": BLACK, "linestyle": ("-", "--", "-.", ":")[i % 4]}
+        axes.plot(1e3 * y, 1e3 * profile.height(y), linewidth=0.8, label=plain(profile.name), **line)
+        axes.plot(1e3 * y[inside], 1e3 * profile.height(y[inside]), linewidth=2.2, **line)
+    if len(drawn.different) > 1:
+        axes.legend(loc="best", fontsize="small")
     for side, look, marker in ((0, LEFT, "v"), (1, RIGHT, "^")):
-        middle = histogram.middle(side)
+        middle, profile = histogram.middle(side), drawn.sides[side]
         axes.plot(1e3 * middle, 1e3 * float(profile.height(middle)), marker, color=look.color, markersize=6)
         if second is not None and second.total[side]:
             middle = second.middle(side)

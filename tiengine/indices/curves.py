@@ -159,20 +159,19 @@ def _gb5599(
 
 
 def _flange_indices(ride: Ride, vehicle: int) -> Iterator[Index]:
-    """Yield the largest Y/Q of the run against Nadal's limit."""
-    if ride.flange_angle is None:
-        return
-    limit, values = nadal_limit(ride.flange_angle, ride.friction), []
+    """Yield the largest Y/Q of the run against Nadal's limit, of the wheel that comes nearest to its own."""
+    values = []
     for w in ride.wheelsets(vehicle):
         forces = ride.forces(w)
         for i, side in enumerate(SIDES):
+            flange_angle = ride.flange_angle_of(w, i)
             quotient = sliding_mean(forces.position, forces.quotient[:, i])[1]
-            if len(quotient):
-                values.append((float(quotient.max()), f"wheelset {w + 1} {side}"))
+            if flange_angle is not None and len(quotient):
+                limit, value = nadal_limit(flange_angle, ride.friction), float(quotient.max())
+                values.append((value - limit, f"wheelset {w + 1} {side}", value, limit, np.degrees(flange_angle)))
     if not values:
         return
-    value, place = max(values)
-    angle = np.degrees(ride.flange_angle)
+    _, place, value, limit, angle = max(values)
     yield Index(
         standard="Nadal", name="largest Y/Q, 2 m mean", vehicle=vehicle + 1, place=place, value=value, unit="-",
         limit=limit, clause="(tan d - mu)/(1 + mu tan d)", shortfall="largest value of the run",

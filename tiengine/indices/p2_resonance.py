@@ -51,14 +51,14 @@ def p2_frequency(
 
 
 def contact_stiffness(parts: Parts, settings: ContactSettings, load: float) -> float:
-    """Compute the slope of Hertz' law for a centred wheelset, 1.5 N^(1/3)/G [N/m].
+    """Compute the slope of Hertz' law for a centred wheelset, 1.5 N^(1/3)/G [N/m], at the first left wheel.
 
     Args:
         parts: Parts of the scenario, of which the profiles are used.
         settings: Placement and material of the contact.
         load: Normal force N [N].
     """
-    pair = WheelRailPair(parts.wheel, parts.rail_profile, settings)
+    pair = WheelRailPair(parts.wheel_profiles[0][0], parts.rail_profiles[0], settings)
     touching = pair.contacts(np.zeros(1), np.zeros(1))
     across = np.maximum(
         transverse_curvature(pair.wheel, pair.canted_rail, touching, settings.curvature_span), SMALLEST_CURVATURE

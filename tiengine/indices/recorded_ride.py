@@ -69,13 +69,18 @@ class RecordedRide(Ride):
         self._patch = result[f"trains/{train:03d}"].get("patch")
         self.speed = scenario.train.speed.fastest
         self.line, self.friction = scenario.track.line, scenario.track.friction
-        self.flange_angle = scenario.parts.wheel.flange_angle
+        angles = {id(profile): profile.flange_angle for pair in scenario.parts.wheel_profiles for profile in pair}
+        self._flange_angles = [[angles[id(profile)] for profile in pair] for pair in scenario.parts.wheel_profiles]
         self.wheel_times = self._times(self._wheel, "wheel", scenario.output.run_in)
         self.body_times = self._times(self._body, "body", scenario.output.run_in)
         self.check_distance()
         names = list(self._body["body"].asstr()[:])
         if missing := [name for name in self._model.body_names if name not in names]:
             raise InputError(f"{self.where}: no body {missing[0]!r}")
+
+    def flange_angle_of(self, wheelset: int, side: int) -> float | None:
+        """Return the steepest angle of a wheel's flange [rad]; ``side`` is 0 for the left one."""
+        return self._flange_angles[wheelset][side]
 
     @property
     def vehicle_classes(self) -> tuple[VehicleClass | None, ...]:

@@ -119,6 +119,10 @@ class Ride(ABC):
     flange_angle: float | None = None
     friction: float = 0.3
 
+    def flange_angle_of(self, wheelset: int, side: int) -> float | None:
+        """Return the steepest angle of a wheel's flange [rad]; ``side`` is 0 for the left one; None if not known."""
+        return self.flange_angle
+
     @property
     @abstractmethod
     def vehicle_classes(self) -> tuple[VehicleClass | None, ...]:

@@ -21,7 +21,7 @@ from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
 
-__all__ = ["RailShape", "RailShapes", "SettledRail", "check_rail_shapes"]
+__all__ = ["Heights", "RailShape", "RailShapes", "SettledRail", "check_rail_shapes"]
 
 SIDES = {"left": (0,), "right": (1,), "both": (0, 1)}
 STEP = 1e-3  # m between the points of a filtered shape: a sixth of the patch
@@ -80,12 +80,13 @@ class RailShape(Params):
         return self
 
 
-class _Heights(Protocol):
+class Heights(Protocol):
     """Height of a running surface and its slope at chainages, and its shortest wave."""
 
     shortest: float
 
-    def evaluate(self, x: Reals) -> tuple[Reals, Reals]: ...
+    def evaluate(self, x: Reals) -> tuple[Reals, Reals]:
+        """Heights [m] and slopes at chainages [m], shape (n,) each."""
 
 
 class _Corrugation:
@@ -159,25 +160,30 @@ def _series(shape: RailShape, where: str) -> _Sampled:
 
 
 class SettledRail:
-    """Static shape of both rails over settled ground, a spline between two chainages."""
+    """Static shape of both rails over displaced ground; what it has at its front end it keeps."""
 
     shortest = float("inf")
 
-    def __init__(self, start: float, end: float, shape: CubicSpline) -> None:
+    def __init__(self, shape: CubicSpline) -> None:
         """Keep the shape.
 
         Args:
-            start: Chainage from which it holds [m]; zero before.
-            end: Up to which it holds [m].
-            shape: Height over chainage [m].
+            shape: Down and to the right [m] over chainage [m]; zero before it begins.
         """
-        self._start, self._end, self._value, self._slope = start, end, shape, shape.derivative()
+        self._start, self._end = float(shape.x[0]), float(shape.x[-1])
+        self._value, self._slope = shape, shape.derivative()
 
     def evaluate(self, x: Reals) -> tuple[Reals, Reals]:
         """Heights [m] and slopes at chainages [m], shape (n,) each."""
-        inside = (x > self._start) & (x < self._end)
+        value, slope = self.both(x)
+        return value[:, 0], slope[:, 0]
+
+    def both(self, x: Reals) -> tuple[Reals, Reals]:
+        """Displacements down and to the right [m] and their slopes at chainages [m], shape (n, 2) each."""
         clipped = np.clip(x, self._start, self._end)
-        return np.where(inside, self._value(clipped), 0.0), np.where(inside, self._slope(clipped), 0.0)
+        begun, inside = x > self._start, (x > self._start) & (x < self._end)
+        value = np.where(begun[:, None], self._value(clipped), 0.0)
+        return value, np.where(inside[:, None], self._slope(clipped), 0.0)
 
 
 class RailShapes:
@@ -187,23 +193,28 @@ class RailShapes:
         waves: Shortest wave of each shape [m], in the order of the scenario.
     """
 
-    def __init__(self, shapes: Sequence[RailShape], settled: Sequence[SettledRail] = ()) -> None:
+    def __init__(
+        self, shapes: Sequence[RailShape], settled: Sequence[SettledRail] = (), laid: Sequence[Heights] = ()
+    ) -> None:
         """Read files and filter shapes.
 
         Args:
             shapes: Entries of the scenario.
-            settled: Shapes of both rails over settled ground.
+            settled: Shapes of both rails over displaced ground.
+            laid: Shapes that the state at rest of a bed without tension leaves to the left and the right rail.
 
         Raises:
             InputError: A file breaks a rule.
         """
-        made: list[tuple[RailShape, _Heights]] = []
+        made: list[tuple[RailShape, Heights]] = []
         for i, shape in enumerate(shapes):
             where = f"track.rail_shapes[{i}]"
             made.append((shape, _made(shape, where)))
         self.waves = tuple(heights.shortest for _, heights in made)
+        self._settled = tuple(settled)
         self._sides = tuple(
-            [*(heights for shape, heights in made if side in SIDES[shape.rail]), *settled] for side in range(2)
+            [*(heights for shape, heights in made if side in SIDES[shape.rail]), *settled, *laid[side : side + 1]]
+            for side in range(2)
         )
 
     def sample(self, x: Reals) -> tuple[Reals, Reals]:
@@ -217,8 +228,15 @@ class RailShapes:
                 slope[:, side] += s
         return value.reshape(*np.shape(x), 2), slope.reshape(*np.shape(x), 2)
 
+    def lateral(self, x: Reals) -> tuple[Reals, Reals]:
+        """Displacement of both rails to the right over displaced ground [m] and its slope, shape as x each."""
+        flat = np.asarray(x, np.float64).reshape(-1)
+        both = [settled.both(flat) for settled in self._settled]
+        value, slope = (sum((each[k][:, 1] for each in both), np.zeros(flat.size)) for k in range(2))
+        return value.reshape(np.shape(x)), slope.reshape(np.shape(x))
 
-def _made(shape: RailShape, where: str) -> _Heights:
+
+def _made(shape: RailShape, where: str) -> Heights:
     """Heights of one shape."""
     if shape.kind == "corrugation":
         return _Corrugation(shape)

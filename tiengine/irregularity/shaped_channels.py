@@ -39,6 +39,7 @@ class ShapedChannels:
             Shape (B, steps, W, N_SHAPED).
         """
         height, slope = self.rails.sample(wheels)
+        aside, turn = self.rails.lateral(wheels)
         joined = np.empty((*irregularity.shape[:-1], at.N_SHAPED))
         joined[..., : at.N_IRREGULARITY] = irregularity
         joined[..., at.TURNED] = (wheels - self._begin) / self._radius
@@ -48,5 +49,7 @@ class ShapedChannels:
             channels[..., at.RAIL_LEFT_SLOPE : at.RAIL_RIGHT_SLOPE + 1] = (
                 slope * T[..., None] + height * T_slope[..., None]
             )
+            channels[..., at.Y_A] += aside * T
+            channels[..., at.Y_A_SLOPE] += turn * T + aside * T_slope
             channels[..., at.GROWN], channels[..., at.GROWN_SLOPE] = T, T_slope
         return joined

@@ -10,10 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
+from tiengine.contact.wheel_contacts import WheelContacts
 from tiengine.irregularity.wheel_shapes import WheelTables
 from tiengine.kernels import layout as at
+from tiengine.model.base_motion_loads import BaseMotionLoads
 from tiengine.model.newmark import Newmark
 from tiengine.parameters.arrays import Reals
+from tiengine.track.dead_state import DeadState
 from tiengine.track.fastening import Fastening, seat_count
 from tiengine.track.knots import Grading, graded_knots
 from tiengine.track.mortar import Mortar
@@ -56,7 +59,8 @@ class Ingredients:
         mortar: Its bed.
         designs: The different slabs.
         train: Vehicles.
-        contact: Contact geometry of wheel and rail.
+        contact: Contact geometry of wheel and rail; that of the first left wheel where they differ.
+        contacts: Contact of every wheel where wheels or rails differ, else None.
         friction: Coefficient of friction.
         cross_level_rolls: Whether a cross level turns the railheads.
         length: Window l [m].
@@ -73,6 +77,8 @@ class Ingredients:
         out_of_round: Tables of wheels out of round; None where all are round.
         trains: Trains advanced together.
         given: What makes given loads of the train, beyond gravity.
+        seat_plays: Gaps of seats first..first+count-1 [m], 0 where none hangs, shape (count, 2); None if none hangs.
+        dead: State at rest of slabs on a bed without tension; None for slabs under their own weight alone.
     """
 
     rail: Rail
@@ -97,8 +103,47 @@ class Ingredients:
     absorbing_zone: float = 0.0
     shaped: bool = False
     out_of_round: WheelTables | None = None
+    contacts: WheelContacts | None = None
     trains: int = 1
     given: tuple[LoadSource, ...] = ()
+    seat_plays: Callable[[int, int], Reals] | None = None
+    dead: DeadState | None = None
+
+    def bound_factors(self, first: int, count: int) -> Reals:
+        """Factors of consecutive fastenings, 0 of those that hang: they carry nothing at rest, shape (count, 2).
+
+        Args:
+            first: Index of the first seat.
+            count: Number of seats.
+        """
+        factors = self.seat_factors(first, count)
+        return factors if self.seat_plays is None else np.where(self.seat_plays(first, count) > 0.0, 0.0, factors)
+
+    def hanging_seats(self, first: int) -> tuple[Reals, Reals]:
+        """Play of the window's seats and their springs at rest, k_v g and k_v u [N], shape (seats, 2) each; 0 if sound.
+
+        Args:
+            first: Index of the rear seat.
+        """
+        assert self.seat_plays is not None
+        play = self.fastening.vertical_stiffness * self.seat_plays(first, self.seats)
+        rest = np.zeros_like(play)
+        if self.dead is not None:
+            for j in np.flatnonzero((play > 0.0).any(axis=1)).tolist():
+                slab, seat = divmod(first + j, self.slab.fastenings)
+                rest[j] = self.dead.seat_force[self.dead.of(slab)][seat]
+        return play, np.where(play > 0.0, rest, 0.0)
+
+    def pressure_at_rest(self, slab: int) -> Reals:
+        """Pressure of the bed under a slab at rest, negative where a gap is open [Pa], shape (n_el, n_q).
+
+        Args:
+            slab: Index along the track.
+        """
+        if self.dead is None:
+            return self.designs.matrices[self.designs.of_slab.get(slab, 0)].bed_weight_pressure
+        pressure: Reals = self.dead.pressure[self.dead.of(slab)]
+        return pressure
 
     @property
     def load_sets(self) -> int:
@@ -108,6 +153,21 @@ class Ingredients:
     def given_loads(self, time: Reals, x: Reals, V: Reals, V_rate: Reals) -> GivenLoads | None:
         """Sum of the given loads, None if there are none; arguments as in :class:`LoadSource`."""
         return sum_of_loads(self.given, self.train, time, x, V, V_rate) if self.given else None
+
+    @property
+    def moving_ground(self) -> BaseMotionLoads | None:
+        """Motion of the ground in time, None if it is at rest."""
+        return next((source for source in self.given if isinstance(source, BaseMotionLoads)), None)
+
+    @property
+    def rail_loads(self) -> int:
+        """Given loads of a rail in a step: on w and v of its trial functions where the ground moves, else none."""
+        return 0 if self.moving_ground is None else 2 * self.functions.count
+
+    @property
+    def contact_values(self) -> Reals:
+        """Contact tables of all wheels, shape (tables n_u, n_alpha, 10 patches)."""
+        return self.contact.values if self.contacts is None else self.contacts.values
 
     @property
     def channels(self) -> int:

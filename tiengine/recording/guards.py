@@ -13,15 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.contact.table import ContactTable
+from tiengine.engine.lookout import Lookout
 from tiengine.engine.state import PARTS
 from tiengine.engine.stepper import Plan, Stepper
 from tiengine.kernels import layout as at
 from tiengine.parameters.arrays import Flags
 from tiengine.parameters.conventions import SIDES
+from tiengine.recording.gap_watch import GapWatch
 from tiengine.recording.step_oscillation import WINDOW, StepOscillation
 from tiengine.result_files.channels import DOFS
 from tiengine.result_files.events import EVENT_KINDS, Event
 from tiengine.scenario.event_policy import Events
+from tiengine.scenario.tables import Track
 from tiengine.vehicle.train import static_wheel_loads
 
 __all__ = ["Guard", "Watch"]
@@ -52,22 +55,25 @@ class Watch:
         lifted: How long each wheel has carried nothing [s], shape (B, W, 2).
         last: Time at which each kind of event was last found at a wheel [s], shape (kinds, B, W, 2).
         ended: Whether the end of the measured track was passed, shape (B,).
+        closed: Whether each gap has closed before, shape (B, gaps).
         oscillation: Of the forces at the step's own frequency.
     """
 
     lifted: NDArray[np.float64]
     last: NDArray[np.float64]
     ended: NDArray[np.bool_]
+    closed: NDArray[np.bool_]
     oscillation: StepOscillation
 
     @classmethod
-    def fresh(cls, trains: int, wheelsets: int) -> Watch:
+    def fresh(cls, trains: int, wheelsets: int, gaps: int = 0) -> Watch:
         """Memory before the first check."""
         wheels = (trains, wheelsets, 2)
         return cls(
             lifted=np.zeros(wheels),
             last=np.full((5, *wheels), -np.inf),
             ended=np.zeros(trains, dtype=np.bool_),
+            closed=np.zeros((trains, gaps), dtype=np.bool_),
             oscillation=StepOscillation.none(trains, wheelsets),
         )
 
@@ -81,28 +87,39 @@ class Guard:
         policy: Consequences of each event, from the scenario.
         track_end: Chainage where each train's measured track ends [m], infinite without, shape (B,).
         watch: Memory from check to check.
+        gaps: Gaps that may close; None if there are none.
         found: Events since they were last taken, by place of the train.
         stopped: Number of the step in which a train was stopped, by its place.
+        called: Whether the stepper looks at the state itself and calls for a check where it is needed.
     """
 
     stepper: Stepper
     policy: Events
     track_end: NDArray[np.float64]
     watch: Watch
+    gaps: GapWatch | None = None
     found: dict[int, list[Event]] = field(default_factory=dict)
     stopped: dict[int, int] = field(default_factory=dict)
+    called: bool = False
 
     @classmethod
-    def watching(cls, stepper: Stepper, policy: Events, track_end: NDArray[np.float64]) -> Guard:
+    def watching(
+        cls, stepper: Stepper, policy: Events, track_end: NDArray[np.float64], track: Track | None = None
+    ) -> Guard:
         """New guard, called by the stepper after each step.
 
         Args:
             stepper: Is watched.
             policy: Consequences of each event, from the scenario.
             track_end: See the class.
+            track: Of the scenario, whose gaps are watched.
         """
         trains, wheelsets, _ = stepper.state.normal_force.shape
-        guard = cls(stepper, policy, track_end, Watch.fresh(trains, wheelsets))
+        gaps = None if track is None else GapWatch.of(track, stepper)
+        watched = gaps if gaps is not None and gaps.count else None
+        watch = Watch.fresh(trains, wheelsets, 0 if watched is None else watched.count)
+        guard = cls(stepper, policy, track_end, watch, watched)
+        guard.called = stepper.look_out(guard.lookout)
         stepper.watch("guards", guard.watch_step, due=guard.due)
         return guard
 
@@ -112,17 +129,24 @@ class Guard:
         self._dt, self._train = ingredients.newmark.dt, ingredients.train
         self._done, self._position = 0, np.zeros(0)
         self._flying = True  # until checked: a checkpoint may have brought wheels in flight
+        self._checked = -1
         self.every = max(int(EVERY / self._dt + 1e-9), 1)
         self._look_every = StepOscillation.interval(self._dt)
         self._shift, self._normal = self.state.relative_shift, self.state.normal_force
         self._tilt = self.state.relative_tilt
         self._static_load = float(static_wheel_loads(self._train).max())
-        table = ingredients.contact
+        table, contacts = ingredients.contact, ingredients.contacts
         # the first node and the last are beyond the range
         self._steepest_tilt, self._innermost = -table.alpha_min - table.dalpha, table.u_min + table.du
-        self._climb, self._derailed = climbing_shift(table), table.u_min + (table.values.shape[0] - 2) * table.du
+        self._climbs = [climbing_shift(each) for each in ((table,) if contacts is None else contacts.tables)]
+        self._least_climb = min(self._climbs)
+        self._table = np.zeros((len(self._train.wheelset_x), 2)) if contacts is None else contacts.number
+        self._derailed = table.u_min + (table.values.shape[0] - 2) * table.du
         self._wheel_front = float(self._train.wheelset_x.max())
         self._nearest_end = float(self.track_end.min())
+        squares = [limit * limit for limit in LIMITS]
+        limits = np.array([*squares, self._least_climb, self._steepest_tilt, self._innermost])
+        self.lookout = Lookout(self.every, limits, self.check_row)
 
     def load(self, done: int, position: NDArray[np.float64]) -> None:
         """Take the numbers and places of the coming steps.
@@ -132,6 +156,18 @@ class Guard:
             position: Chainage of the first vehicle's centre at the end of each [m], shape (steps,).
         """
         self._done, self._position = done, position
+        self.lookout.steps_before = done
+        self._set_always()
+
+    def _set_always(self) -> None:
+        """Let a check follow every look while wheels fly, gaps may close, or a measured track may end in this chunk."""
+        ends = bool(self._position[-1:].max(initial=-np.inf) + self._wheel_front > self._nearest_end)
+        self.lookout.always = self._flying or ends or self.gaps is not None
+
+    def check_row(self, i: int) -> None:
+        """Check the state after the step in row ``i`` of the chunk."""
+        self.check(self._done + i + 1, float(self._position[i]))
+        self._set_always()
 
     def watch_step(self) -> None:
         """Check at the end of a step if it is time to, and after the last of a chunk."""
@@ -139,14 +175,14 @@ class Guard:
         step, position = self._done + i + 1, float(self._position[i])
         if (i + 1) % self._look_every == 0:
             self._oscillates(i, step * self._dt, position)
-        if step % self.every == 0 or i + 1 == len(self._position):
+        if (step % self.every == 0 or i + 1 == len(self._position)) and step != self._checked:
             self.check(step, position)
 
     def due(self, plan: Plan) -> Flags:
         """Steps after which the state is checked, or the forces of the last ones are looked at."""
-        checked = (self._done + plan.step + 1) % self.every == 0
-        looked = (plan.step + 1) % self._look_every == 0
-        due: Flags = checked | looked | (plan.step + 1 == len(self._position))
+        due: Flags = ((plan.step + 1) % self._look_every == 0) | (plan.step + 1 == len(self._position))
+        if not self.called:
+            due |= (self._done + plan.step + 1) % self.every == 0
         return due
 
     def check(self, step: int, position: float) -> None:
@@ -156,7 +192,7 @@ class Guard:
             step: Its number, from 1.
             position: Chainage of the first vehicle's centre [m].
         """
-        time = step * self._dt
+        time, self._checked = step * self._dt, step
         squares = zip(self.state.squares(), LIMITS, strict=True)
         if not all(square < limit * limit for square, limit in squares):  # not a number is not less, either
             self._runaway(step, time, position)
@@ -164,10 +200,14 @@ class Guard:
             self._lifts(step, time, position)
         elif self._flying:
             self.watch.lifted[:], self._flying = 0.0, False
-        if self._shift.max() > self._climb:
-            self._climbs(step, time, position)
+        if self._shift.max() > self._least_climb:
+            self._climb(step, time, position)
         if np.abs(self._tilt).max() > self._steepest_tilt or self._shift.min() < self._innermost:
             self._leaves_table(step, time, position)
+        if self.gaps is not None:
+            for train, side, words in self.gaps.fresh(self.gaps.closed(), self.watch.closed):
+                stops = self.policy.gap_closes == "stop"
+                self._report(train, step, Event("gap_closes", time, position, 0, side, words, stops))
         if position + self._wheel_front > self._nearest_end:
             self._track_ends(step, time, position)
 
@@ -179,11 +219,13 @@ class Guard:
         lasting = lifted >= self.policy.wheel_lift_time
         self._report_wheels(2, lasting, step, time, position, f"off the rail for {self.policy.wheel_lift_time:g} s")
 
-    def _climbs(self, step: int, time: float, position: float) -> None:
+    def _climb(self, step: int, time: float, position: float) -> None:
         """Report wheels beyond the steepest part of their flange, or beyond their profile."""
-        climbs = (self._shift > self._climb) & (self._normal > 0.0)
-        words = f"climbs on its flange: lateral shift beyond {self._climb * 1e3:.1f} mm"
-        self._report_wheels(1, climbs, step, time, position, words)
+        touching = self._normal > 0.0
+        for table, limit in enumerate(self._climbs):
+            climbs = (self._shift > limit) & touching & (self._table == table)
+            words = f"climbs on its flange: lateral shift beyond {limit * 1e3:.1f} mm"
+            self._report_wheels(1, climbs, step, time, position, words)
         words = f"derailed: lateral shift beyond {self._derailed * 1e3:.1f} mm on the flange side"
         self._report_wheels(0, self._shift > self._derailed, step, time, position, words)
 

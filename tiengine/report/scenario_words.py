@@ -7,14 +7,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from tiengine.scenario.ensemble import Ensemble
 
 if TYPE_CHECKING:
+    from tiengine.scenario.parts import Parts
     from tiengine.scenario.scenario import Scenario
     from tiengine.track.defects import FailedFastenings
     from tiengine.track.mortar import MortarVoid
 
 __all__ = ["scenario_words"]
+
+GROUND = {"cosine": "a cosine", "angles": "two ramps that meet", "ramp": "a ramp"}
 
 
 def scenario_words(scenario: Scenario) -> list[tuple[str, str]]:
@@ -33,6 +38,8 @@ def scenario_words(scenario: Scenario) -> list[tuple[str, str]]:
         ("Defects", "; ".join(_defects(scenario)) or "none"),
         ("Numerics", _numerics(scenario)),
     ]
+    if ground := "; ".join(_ground(scenario)):
+        rows.insert(3, ("Ground", ground))
     if scenario.ensemble != Ensemble():
         rows.insert(0, ("Trains", _ensemble(scenario)))
     if scenario.source:
@@ -48,14 +55,32 @@ def _train(scenario: Scenario) -> str:
         speed = ", ".join(f"{v:g} km/h at {x:g} m" for x, v in train.speed_kmh)
     else:
         speed = f"{train.speed_kmh:g} km/h"
-    return f"{vehicles} with {parts.wheel.name} wheels, over {train.distance:g} m at {speed}"
+    return f"{vehicles} with {_wheels(parts)}, over {train.distance:g} m at {speed}"
+
+
+def _wheels(parts: Parts) -> str:
+    """Profiles of the wheels, and their radii where these differ from the vehicle's."""
+    names = Counter(profile.name for pair in parts.wheel_profiles for profile in pair)
+    (common, _), *others = names.most_common()
+    words = f"{common} wheels" + "".join(f", {count} of {name}" for name, count in others)
+    nominal = np.array([v.wheel_radius for v in parts.vehicles for _ in v.axle_positions])
+    count = int((parts.radii != nominal[:, None]).sum())
+    if not count:
+        return words
+    return f"{words} ({count} with radii of their own, all from {parts.radii.min():g} to {parts.radii.max():g} m)"
+
+
+def _railheads(parts: Parts) -> str:
+    """Profiles of the rails."""
+    left, right = (profile.name for profile in parts.rail_profiles)
+    return f"{left} profile" if left == right else f"{left} profile on the left and {right} on the right"
 
 
 def _track(scenario: Scenario) -> str:
     parts, track = scenario.parts, scenario.track
     slab, fastening = parts.slab, parts.fastening
     return (
-        f"{parts.rail.name} rails with {parts.rail_profile.name} profile, cant {_cant(track.cant)}, gauge"
+        f"{parts.rail.name} rails with {_railheads(parts)}, cant {_cant(track.cant)}, gauge"
         f" {1e3 * track.gauge:g} mm, friction {track.friction:g}; {fastening.name} fastenings"
         f" ({1e-6 * fastening.vertical_stiffness:g} kN/mm) every {slab.fastening_pitch:g} m; {slab.name} slabs of"
         f" {slab.length:g} x {slab.width:g} x {slab.thickness:g} m on a bed of {1e-9 * parts.mortar.stiffness:g} N/mm³"
@@ -89,6 +114,22 @@ def _defects(scenario: Scenario) -> Iterator[str]:
         yield _fastenings(row, slab.fastening_pitch)
     for void in scenario.track.mortar_voids:
         yield _void(void)
+
+
+def _ground(scenario: Scenario) -> Iterator[str]:
+    """Displacements of the ground, then its motion in time."""
+    for each in scenario.track.ground:
+        if each.file is not None:
+            yield f"displaced by {Path(each.file).name}" + (f", times {each.scale:g}" if each.scale != 1.0 else "")
+            continue
+        sizes = (("down", "up", each.depth), ("to the right", "to the left", each.lateral))
+        moved = [f"{1e3 * abs(size):g} mm {plus if size > 0.0 else minus}" for plus, minus, size in sizes if size]
+        yield f"displaced {' and '.join(moved)}, {GROUND[each.kind]} over {each.length:g} m at chainage {each.at:g} m"
+    moving = scenario.track.base_motion
+    if moving.file is not None:
+        scale = f", times {moving.scale:g}" if moving.scale != 1.0 else ""
+        speed = "everywhere at once" if moving.wave_speed is None else f"travelling at {moving.wave_speed:g} m/s"
+        yield f"moving in time by {Path(moving.file).name}{scale}, {speed}, from {moving.start:g} s on"
 
 
 def _fastenings(row: FailedFastenings, pitch: float) -> str:

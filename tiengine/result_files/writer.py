@@ -18,7 +18,8 @@ The root attribute ``status`` is "running" until the run has ended.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
@@ -162,11 +163,12 @@ class Writer:
         for name, spec in self._specs.items():
             grow = (*spec.channels, *(() if spec.times_of else (spec.axis.name, spec.axis.chainage)))
             kept = rows.get(name, 0)
-            if any(node[f"{name}/{key}"].shape[0] < kept for key in grow):
+            datasets = {key: node[f"{name}/{key}"] for key in grow}
+            if any(dataset.shape[0] < kept for dataset in datasets.values()):
                 raise InputError(
                     f"{self._path}: train {train} has fewer samples than its checkpoint states; run the scenario again"
                 )
-            self._columns[train, name] = {key: GrowingDataset(node[f"{name}/{key}"], kept) for key in grow}
+            self._columns[train, name] = {key: GrowingDataset(dataset, kept) for key, dataset in datasets.items()}
         self._events[train] = rows.get(EVENTS, 0)
 
     def rows(self, train: int) -> dict[str, int]:
@@ -239,10 +241,9 @@ class Writer:
             expected = (len(along), *columns[name].sample_shape)
             if value.shape != expected:
                 raise ValueError(f"{group}/{name}: shape {value.shape}, expected {expected}")
-            try:
+        with self._disk_errors():
+            for name, value in values.items():
                 columns[name].extend(value)
-            except OSError as error:
-                raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
 
     def commit(self) -> None:
         """Make all written data permanent; readers see them from now on.
@@ -250,6 +251,7 @@ class Writer:
         Raises:
             InputError: The disk is full or has failed.
         """
+        self._flush()
         self._output.commit()
         self._samples_kept |= self._samples_written
 
@@ -265,6 +267,7 @@ class Writer:
         Raises:
             InputError: The file cannot be completed; it holds the last commit.
         """
+        self._flush()
         result = self._output.complete(attributes)
         self._finished = True
         return result
@@ -274,6 +277,21 @@ class Writer:
         if not self._finished:
             self._finished = True
             self._output.leave(keep=self._samples_kept)
+
+    def _flush(self) -> None:
+        """Hand all samples that still wait in memory to HDF5."""
+        with self._disk_errors():
+            for columns in self._columns.values():
+                for column in columns.values():
+                    column.flush()
+
+    @contextmanager
+    def _disk_errors(self) -> Iterator[None]:
+        """Convert errors of the disk."""
+        try:
+            yield
+        except OSError as error:
+            raise InputError(f"output = '{self._path}': cannot be written ({error})") from None
 
     def _create_train(self, train: Any, labels: TrainLabels) -> None:
         """Create the groups, scales and empty channels of one train."""
@@ -291,21 +309,19 @@ class Writer:
             for dimension, (values, meaning) in labels.scales(spec.dimensions).items():
                 _describe(group.create_dataset(dimension, data=values), meaning).make_scale(dimension)
                 coordinates += _create_auxiliary(group, dimension, labels)
+            scales = [group[dimension] for dimension in (axis.name, *spec.dimensions)]
             for channel, meaning in spec.channels.items():
-                self._create_channel(group, channel, meaning, spec, coordinates)
+                dataset = self._create_channel(group, channel, [scale.shape[0] for scale in scales[1:]], spec.chunk)
+                _describe(dataset, meaning).attrs["coordinates"] = " ".join(coordinates)
+                for dimension, scale in zip(dataset.dims, scales, strict=True):
+                    dimension.attach_scale(scale)
         create_events(train.create_group(EVENTS))
 
-    def _create_channel(
-        self, group: Any, name: str, meaning: Channel, spec: GroupSpec, coordinates: Sequence[str]
-    ) -> None:
-        """Create an empty channel with its scales."""
-        fixed = tuple(group[dimension].shape[0] for dimension in spec.dimensions)
-        dataset = group.create_dataset(
-            name, (0, *fixed), self._dtype, maxshape=(None, *fixed), chunks=(spec.chunk, *fixed), **CHECKED
+    def _create_channel(self, group: Any, name: str, sample: Sequence[int], chunk: int) -> Any:
+        """Create an empty channel for samples of a shape, stored by so many."""
+        return group.create_dataset(
+            name, (0, *sample), self._dtype, maxshape=(None, *sample), chunks=(chunk, *sample), **CHECKED
         )
-        _describe(dataset, meaning).attrs["coordinates"] = " ".join(coordinates)
-        for i, dimension in enumerate((spec.axis.name, *spec.dimensions)):
-            dataset.dims[i].attach_scale(group[dimension])
 
 
 def _upgrade(file: Any) -> None:

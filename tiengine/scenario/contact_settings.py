@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from tiengine.contact.table import ContactSettings
-from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import Scenario
 from tiengine.vehicle.train import TrainModel
 
 
-def contact_settings(scenario: Scenario, train: TrainModel) -> ContactSettings:
-    """Placement and material of wheels and rails; all wheels of a train share one contact table.
+def contact_settings(scenario: Scenario, train: TrainModel, wheelset: int = 0) -> ContactSettings:
+    """Placement and material of the wheels of a wheelset and the rails.
 
-    Raises:
-        InputError: Vehicles whose wheels differ.
+    The radius is that of the vehicle: what single wheels have beyond it needs no table of its own.
+
+    Args:
+        scenario: The scenario.
+        train: Its train.
+        wheelset: Number of the wheelset.
     """
     parts, track = scenario.parts, scenario.track
-    for what, values in (("wheel_radius", train.wheel_radius), ("half_span_contact", train.half_spacing)):
-        if np.ptp(values) > 0.0:
-            raise InputError(
-                f"train.vehicles: {what} is {values.min():g} and {values.max():g} m;"
-                " vehicles of one train must agree, they share a contact table"
-            )
+    vehicle = parts.vehicles[train.wheelset_vehicle[wheelset]]
     return ContactSettings(
         gauge=track.gauge,
         gauge_depth=track.gauge_depth,
         cant=track.cant,
-        half_spacing=float(train.half_spacing[0]),
-        wheel_radius=float(train.wheel_radius[0]),
+        half_spacing=vehicle.half_spacing,
+        wheel_radius=vehicle.wheel_radius,
         E=parts.rail.E,
         nu=parts.rail.nu,
         hertz=scenario.contact.hertz,

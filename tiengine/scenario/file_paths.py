@@ -12,7 +12,14 @@ from tiengine.track.alignment_file import read_alignment
 
 __all__ = ["absolute_files", "absolute_vary"]
 
-FILES = (("irregularity",), ("track", "rail_shapes"), ("train", "wheel_shapes"), ("train", "forces"))
+FILES = (
+    ("irregularity",),
+    ("track", "rail_shapes"),
+    ("track", "ground"),
+    ("track", "base_motion"),
+    ("train", "wheel_shapes"),
+    ("train", "forces"),
+)
 """Tables, or lists of tables, whose key ``file`` names such a file."""
 
 

@@ -23,6 +23,7 @@ from tiengine.parameters.presets import KINDS, find_preset
 from tiengine.parameters.quantity import build
 from tiengine.scenario.part import Presets
 from tiengine.scenario.profile_part import build_profile, profile_table
+from tiengine.scenario.wheel_profiles import profiles_and_radii
 from tiengine.track.fastening import Fastening
 from tiengine.track.mortar import Mortar
 from tiengine.track.rail import Rail
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Parts", "build_parts", "collect_presets", "used_presets"]
 
+RAILHEADS = ("rail_profile_left", "rail_profile_right")
+
 
 @dataclass(frozen=True, eq=False)
 class Parts:
@@ -44,9 +47,12 @@ class Parts:
     Attributes:
         vehicles: The vehicles, the leading one first.
         centres: Vehicle centres relative to the first's [m], shape (vehicles,); 0, then negative.
-        wheel: Wheel profile.
+        wheel: Profile of wheels that have no other.
         rail: Section of the rail.
-        rail_profile: Profile of the railhead, upright unless it says otherwise.
+        rail_profile: Profile of railheads that have no other, upright unless it says otherwise.
+        wheel_profiles: Profiles of the left and the right wheel of each wheelset, the leading one first.
+        radii: Radius of each wheel at its tape circle [m], shape (wheelsets, 2).
+        rail_profiles: Profiles of the left and the right railhead.
         slab: Slab.
         mortar: Mortar bed of the slab.
         fastening: Fastening.
@@ -60,6 +66,9 @@ class Parts:
     wheel: Profile
     rail: Rail
     rail_profile: Profile
+    wheel_profiles: tuple[tuple[Profile, Profile], ...]
+    radii: NDArray[np.float64]
+    rail_profiles: tuple[Profile, Profile]
     slab: Slab
     mortar: Mortar
     fastening: Fastening
@@ -75,8 +84,8 @@ class Parts:
 
     @property
     def wheel_radii(self) -> tuple[float, ...]:
-        """r0 of every wheelset, the leading one first [m]."""
-        return tuple(v.wheel_radius for v in self.vehicles for _ in v.axle_positions)
+        """Mean radius of every wheelset's wheels, r0, the leading one first [m]."""
+        return tuple(self.radii.mean(axis=1).tolist())
 
     @property
     def wheel_span(self) -> float:
@@ -171,12 +180,17 @@ def build_parts(train: Train, track: Track, wind: BlowingWind, presets: Presets)
     mortar = build(Mortar, mortar_table, "track.slab.mortar")
     if track.mortar_no_tension:
         mortar = mortar.model_copy(update={"no_tension": True})
+    wheel, wheels, radii = _wheels(train, vehicles, tables)
+    rails = _railheads(track, tables)
     return Parts(
         vehicles=tuple(vehicles),
         centres=_centres(vehicles, train),
-        wheel=build_profile(tables["train.wheel_profile"], "train.wheel_profile", "wheel"),
+        wheel=wheel,
         rail=build(Rail, tables["track.rail"], "track.rail"),
-        rail_profile=build_profile(tables["track.rail_profile"], "track.rail_profile", "rail"),
+        rail_profile=rails[0],
+        wheel_profiles=wheels,
+        radii=radii,
+        rail_profiles=(rails[1], rails[2]),
         slab=build(Slab, slab_table, "track.slab"),
         mortar=mortar,
         fastening=build(Fastening, tables["track.fastening"], "track.fastening"),
@@ -195,8 +209,14 @@ def _references(train: Train, track: Track, wind: BlowingWind) -> Iterator[tuple
     for i, coupled in enumerate(train.couplings):
         yield f"train.couplings[{i}].part", "couplings", coupled.part
     yield "train.wheel_profile", "profiles", train.wheel_profile
+    for i, entry in enumerate(train.wheel_profiles):
+        if entry.profile is not None:
+            yield f"train.wheel_profiles[{i}].profile", "profiles", entry.profile
     yield "track.rail", "rails", track.rail
     yield "track.rail_profile", "profiles", track.rail_profile
+    for key in RAILHEADS:
+        if (part := getattr(track, key)) is not None:
+            yield f"track.{key}", "profiles", part
     yield "track.slab", "slabs", track.slab
     yield "track.fastening", "fastenings", track.fastening
     if wind.speed is not None:
@@ -208,7 +228,7 @@ def _read(where: str, kind: str, name: str, folder: Path | None, stated: Mapping
     path = find_preset(kind, name, folder=folder, called=where)
     if path.suffix == ".toml":
         return load_toml(path)
-    body: Kind = "wheel" if where == "train.wheel_profile" else "rail"
+    body: Kind = "wheel" if where.startswith("train.") else "rail"
     return profile_table(path, body, f"{where} = {name!r}", stated)
 
 
@@ -234,6 +254,29 @@ def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
         merged[key] = _merged(merged[key], value) if both else value
     return merged
+
+
+def _wheels(
+    train: Train, vehicles: list[Vehicle], tables: Mapping[str, dict[str, Any]]
+) -> tuple[Profile, tuple[tuple[Profile, Profile], ...], NDArray[np.float64]]:
+    """Profile of all wheels that have no other, profiles and radii of every wheel."""
+    common = build_profile(tables["train.wheel_profile"], "train.wheel_profile", "wheel")
+    own = {}
+    for i, entry in enumerate(train.wheel_profiles):
+        if entry.profile is not None:
+            where = f"train.wheel_profiles[{i}].profile"
+            own[i] = build_profile(tables[where], where, "wheel")
+    return common, *profiles_and_radii(train.wheel_profiles, vehicles, common, own)
+
+
+def _railheads(track: Track, tables: Mapping[str, dict[str, Any]]) -> tuple[Profile, Profile, Profile]:
+    """Profile of railheads that have no other, of the left and of the right one."""
+    common = build_profile(tables["track.rail_profile"], "track.rail_profile", "rail")
+    left, right = (
+        common if getattr(track, key) is None else build_profile(tables[f"track.{key}"], f"track.{key}", "rail")
+        for key in RAILHEADS
+    )
+    return common, left, right
 
 
 def _aerodynamics(

@@ -10,19 +10,22 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from tiengine.irregularity.base_motion import BaseMotion
+from tiengine.irregularity.ground import Ground
 from tiengine.irregularity.rail_shapes import RailShape
 from tiengine.irregularity.wheel_shapes import WheelShape
 from tiengine.parameters.quantity import Params, Q
 from tiengine.result_files.channels import BODY, IRREGULARITY, WHEEL
 from tiengine.scenario.key_checks import channel_names, check_speed, number_or
 from tiengine.scenario.part import Part
+from tiengine.scenario.wheel_profiles import WheelProfile
 from tiengine.track.alignment import Alignment
 from tiengine.track.alignment_elements import AlignmentElement, AlignmentRows, alignment_of
 from tiengine.track.alignment_file import MOST_ROWS
 from tiengine.track.defects import FailedFastenings
 from tiengine.track.knots import Grading
 from tiengine.track.mortar import MortarVoid
-from tiengine.track.settlement import Settlement
+from tiengine.track.slab_warp import SlabWarp
 from tiengine.vehicle.assembly import Effort
 from tiengine.vehicle.force_history import BodyForce
 from tiengine.vehicle.speed_programme import SpeedProfile
@@ -75,7 +78,10 @@ class Train(Params):
             description="chainage of the first vehicle's centre at t = 0; \"auto\": the window's rear end is at zero"
         ),
     ] = "auto"
-    wheel_profile: Annotated[Part, Field(description="part: profile of all wheels")] = "LMA"
+    wheel_profile: Annotated[Part, Field(description="part: profile of all wheels that have no other")] = "LMA"
+    wheel_profiles: Annotated[
+        tuple[WheelProfile, ...], Field(description="tables, see below", max_length=MOST_SHAPES)
+    ] = ()
     series_springs: Annotated[
         bool,
         Field(description="springs in series with dampers (k_series) are modelled; a vehicle may also set this itself"),
@@ -109,7 +115,11 @@ class Track(Params):
     """Track, friction and defects."""
 
     rail: Annotated[Part, Field(description="part: section and material")] = "CHN60"
-    rail_profile: Annotated[Part, Field(description="part: surface of the railhead")] = "CHN60"
+    rail_profile: Annotated[Part, Field(description="part: surface of the railheads")] = "CHN60"
+    rail_profile_left: Annotated[Part | None, Field(description="part: surface of the left railhead if another")] = None
+    rail_profile_right: Annotated[Part | None, Field(description="part: surface of the right railhead if another")] = (
+        None
+    )
     slab: Annotated[Part, Field(description="part: slab and its bed")] = "CRTS_III"
     fastening: Annotated[Part, Field(description="part: spring and damper of a seat")] = "ACE2021"
     friction: Annotated[float, Q("-", "coefficient of friction", gt=0, le=1)] = 0.3
@@ -147,8 +157,9 @@ class Track(Params):
         tuple[MortarVoid, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
     rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
-
-    settlements: Annotated[tuple[Settlement, ...], Field(description="tables, see below", max_length=1000)] = ()
+    base_motion: Annotated[BaseMotion, Field(description="table, see below")] = BaseMotion()
+    ground: Annotated[tuple[Ground, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
+    slab_warps: Annotated[tuple[SlabWarp, ...], Field(description="tables, see below", max_length=1000)] = ()
 
     @property
     def line(self) -> Alignment | None:

@@ -20,8 +20,9 @@ from tiengine.scenario.scenario import Scenario, to_toml
 
 __all__ = ["TRAINS_TOGETHER", "Task", "likeness", "plan"]
 
-TRAINS_TOGETHER = 16
-"""Most trains advanced together."""
+TRAINS_TOGETHER = {"splines": 4, "sines": 16}
+"""Most trains advanced together, by the rails' trial functions: the rails of four trains fill a vector of the spline
+step, more only leave cores idle; the dense products of sines gain from every further train."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,20 +49,19 @@ class Task:
         return len(self.tracks)
 
 
-def plan(
-    scenario: Scenario, together: int = TRAINS_TOGETHER, functions: Sequence[TrackFunction] = ()
-) -> tuple[Task, ...]:
+def plan(scenario: Scenario, together: int | None = None, functions: Sequence[TrackFunction] = ()) -> tuple[Task, ...]:
     """Cut an ensemble into tasks.
 
     Args:
         scenario: The whole ensemble.
-        together: Most trains in a task.
+        together: Most trains in a task; None takes ``TRAINS_TOGETHER``.
         functions: Function that gives the track of every train; empty where none does.
 
     Raises:
         InputError: A file of measured irregularity cannot be read, or the functions are not those of the scenario.
     """
     _check_functions(scenario, functions)
+    together = together or TRAINS_TOGETHER[scenario.numerics.trial_functions]
     members = scenario.members
     groups: dict[str, list[int]] = {}
     for i, train in enumerate(members):

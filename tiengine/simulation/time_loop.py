@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import zip_longest
 from typing import Any
 
@@ -20,10 +21,12 @@ from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Plan, Stepper
 from tiengine.engine.time_step import prepare
+from tiengine.irregularity.ground import LATERAL, Ground, ground_shape, reach_of
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.irregularity.rail_shapes import RailShapes, SettledRail
 from tiengine.irregularity.shaped_channels import ShapedChannels
 from tiengine.irregularity.track_checks import check_reach
+from tiengine.kernels import layout as at
 from tiengine.model.constant_data import Model
 from tiengine.recording.guards import Guard
 from tiengine.recording.recorder import Recorder
@@ -32,7 +35,8 @@ from tiengine.result_files.layout import Block, TrainLabels
 from tiengine.scenario.scenario import Scenario
 from tiengine.simulation.messages import Advanced
 from tiengine.simulation.tasks import Task
-from tiengine.track.settled_rail import settled_rail
+from tiengine.track.dead_state import LaidRail
+from tiengine.track.settled_rail import GroundShape, settled_rail
 
 __all__ = ["CHUNK_STEPS", "LoopTimer", "Run"]
 
@@ -134,7 +138,7 @@ class Run:
         tracks = [make_irregularity(track, lead, f) for track, f in zip_longest(task.tracks, task.functions)]
         start = scenario.rear + ingredients.centre_s
         check_reach(tracks, start + scenario.train.distance + float(ingredients.train.wheelset_x.max()))
-        guard = Guard.watching(stepper, scenario.events, np.array([track.end for track in tracks]))
+        guard = Guard.watching(stepper, scenario.events, np.array([track.end for track in tracks]), scenario.track)
         places = list(range(len(task.trains)))
         steps = np.zeros(len(places), np.int64)
         shapes = _shapes(scenario, model, start)
@@ -180,6 +184,7 @@ class Run:
             self.timer.lap(None)
             self.stepper.finish(recorder.body_rows(done, count))
         self.timer.lap("mortar")
+        self._move_with_ground(x)
         sent = self._collect(x)
         self.done += count
         return sent
@@ -198,11 +203,22 @@ class Run:
         self.timer.lap("irregularity")
         time = ingredients.newmark.dt * np.arange(self.done + 1.0, self.done + count + 1.0)
         given = ingredients.given_loads(time, x, V, V_rate)
-        self.stepper.load(x - ingredients.centre_s, V, V_rate, irregularity, given)
+        self.stepper.load(x - ingredients.centre_s, V, V_rate, irregularity, given, time)
         self.guard.load(self.done, x)
         self.position = float(x[-1])
         self.timer.lap("window and seats")
         return x
+
+    def _move_with_ground(self, x: NDArray[np.float64]) -> None:
+        """Add the ground's motion to that of the bodies, recorded from it, at steps that end at chainages x [m]."""
+        ground, chunk = self.stepper.ingredients.moving_ground, self.stepper.chunk
+        if ground is None or not chunk.filled:
+            return
+        number = np.arange(self.done + 1, self.done + len(x) + 1)
+        taken = number % self.recorder.body_every == 0
+        V, V_rate = chunk.clock[: len(x)][taken][:, [at.SPEED, at.SPEED_RATE]].T[..., None]
+        motion = ground.motion(number[taken] * self.recorder.dt, x[taken], V, V_rate)
+        chunk.body[:, : chunk.filled] += motion.reshape(*motion.shape[:2], -1)
 
     def _collect(self, x: NDArray[np.float64]) -> Advanced:
         """Blocks and events of the steps that end at chainages x [m]; trains that failed are taken out."""
@@ -248,19 +264,27 @@ def _shapes(scenario: Scenario, model: Model, start: float) -> ShapedChannels | 
     g = model.ingredients
     settled = [
         SettledRail(
-            *settled_rail(
-                each,
+            settled_rail(
+                partial(ground_shape, each) if g.dead is None else _sideways(each),
+                reach_of(each),
                 g.rail,
                 g.fastening,
                 g.slab,
-                g.mortar.stiffness,
+                g.mortar,
                 lambda slab: g.designs.matrices[g.designs.of_slab.get(slab, 0)],
                 g.seat_factors,
             )
         )
-        for each in scenario.track.settlements
+        for each in scenario.track.ground
     ]
-    return ShapedChannels(RailShapes(scenario.track.rail_shapes, settled), start + train.wheelset_x, train.wheel_radius)
+    laid = [] if g.dead is None else [LaidRail(g.dead, side) for side in range(2)]
+    rails = RailShapes(scenario.track.rail_shapes, settled, laid)
+    return ShapedChannels(rails, start + train.wheelset_x, train.wheel_radius)
+
+
+def _sideways(ground: Ground) -> GroundShape:
+    """Displacement of the ground to the right alone: the state at rest of slabs that may lift has the vertical one."""
+    return lambda x, direction: ground_shape(ground, x, direction) if direction == LATERAL else np.zeros_like(x)
 
 
 def _started(scenario: Scenario, model: Model) -> State:

@@ -79,12 +79,11 @@ def work(pipe: Connection, run: Runner) -> None:
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
     try:
-        with threadpool_limits(1):
+        pipe.send(IDLE)
+        while (received := pipe.recv()) not in (None, STOP):
+            task, saved = received
+            run(task, saved, pipe.poll, pipe.send)
             pipe.send(IDLE)
-            while (received := pipe.recv()) not in (None, STOP):
-                task, saved = received
-                run(task, saved, pipe.poll, pipe.send)
-                pipe.send(IDLE)
     except (EOFError, ConnectionError):  # the parent is gone
         return
 
@@ -110,8 +109,9 @@ def send_task(
     """
     from tiengine.simulation.stream import run_task
 
-    for message in run_task(task, public=public, saved=saved, every=every, stop=stop):
-        send(message)
+    with threadpool_limits(1):  # of the libraries that are loaded by now: the engine has loaded all of them
+        for message in run_task(task, public=public, saved=saved, every=every, stop=stop):
+            send(message)
 
 
 def _exit_with_parent() -> None:

@@ -28,9 +28,12 @@ baseplate the moment below them is that of an element of the fine mesh and means
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
+from threadpoolctl import threadpool_limits
 
 from tiengine.kernels import plate
 from tiengine.parameters.arrays import Reals
@@ -39,10 +42,10 @@ from tiengine.track.fastening import POINT
 from tiengine.track.mortar import GAUSS, Mortar
 from tiengine.track.plate_shapes import WX, WXX, WY, WYY, W, element_dofs, locate, shapes_at, tabulate_shapes
 from tiengine.track.slab import Slab
-from tiengine.track.slab_matrices import SlabMatrices, seat_shapes
+from tiengine.track.slab_matrices import SlabMatrices, bed_points, seat_shapes
 
 __all__ = [
-    "GAUSS_POINTS", "MomentTable", "fine_mesh", "moment_rows", "moment_table", "moments_of_motion",
+    "GAUSS_POINTS", "MomentTable", "bed_places", "fine_mesh", "moment_rows", "moment_table", "moments_of_motion",
     "moments_of_pressure", "nodes", "places", "plate_matrices", "pressures_felt",
 ]  # fmt: skip
 
@@ -108,6 +111,7 @@ class MomentTable:
         self.places, self.matrix = where, matrix
 
 
+@lru_cache(maxsize=4)  # a task asks again for the table of the last one
 def moment_table(
     slab: Slab, mortar: Mortar | None, baseplate: tuple[float, float] = POINT, fine: Slab | None = None
 ) -> MomentTable:
@@ -119,7 +123,12 @@ def moment_table(
         baseplate: Rectangle on which a seat presses, along and across [m].
         fine: The slab with the fine mesh, if not that of :func:`fine_mesh`.
     """
-    fine = fine or fine_mesh(slab)
+    with threadpool_limits(1):  # the same bits for whoever asks first
+        return _moment_table(slab, mortar, baseplate, fine or fine_mesh(slab))
+
+
+def _moment_table(slab: Slab, mortar: Mortar | None, baseplate: tuple[float, float], fine: Slab) -> MomentTable:
+    """The same on one thread."""
     K, M, B = plate_matrices(fine)
     along, across = np.arange(1 - slab.fastenings, slab.fastenings) / 2.0, np.array([-1.0, 0.0, 1.0])
     grid = np.meshgrid(slab.fastening_pitch * along, slab.seat_half_spacing * across, indexing="ij")
@@ -196,11 +205,7 @@ def pressures_felt(design: SlabMatrices) -> Reals:
     Args:
         design: Matrices of the slab.
     """
-    elements, points = design.bed_factor.shape
-    shapes = np.zeros((design.n, elements, points))
-    for e, index in enumerate(design.bed_index):
-        shapes[index, e] = design.bed_shape.T
-    return (shapes * design.bed_factor).reshape(design.n, -1)
+    return bed_points(design) * design.bed_factor.ravel()
 
 
 def _of_free_plate(slab: Slab, K: sp.csr_array, M: sp.csr_array, loads: Reals) -> Reals:
@@ -279,6 +284,15 @@ def _interpolation(slab: Slab, fine: Slab) -> sp.csr_array:
     column = np.repeat(index, 3, axis=0)
     values = table[:, [W, WX, WY]]
     return sp.csr_array((values.ravel(), (row, column.ravel())), shape=(fine.plate_dofs, slab.plate_dofs + 2))
+
+
+def bed_places(slab: Slab) -> tuple[Reals, Reals]:
+    """Coordinates of the bed's quadrature points, from the slab's centre [m], shape (points,) each.
+
+    Args:
+        slab: The slab with its mesh.
+    """
+    return places(slab, _quadrature(slab)[0])
 
 
 def plate_matrices(slab: Slab) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:

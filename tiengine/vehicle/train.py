@@ -16,7 +16,7 @@ longitudinal coordinate the longitudinal springs resist it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -267,6 +267,19 @@ def _reduce(
         element_names=tuple(element.name for element in full.elements),
         element_between_cars=np.array([element.between_cars for element in full.elements], dtype=np.bool_),
     )
+
+
+def with_wheel_radii(train: TrainModel, radius: NDArray[np.float64]) -> TrainModel:
+    """Give every wheelset the mean radius of its own wheels, on which it spins; the same object if it has that already.
+
+    Args:
+        train: The train with its vehicles' radii.
+        radius: Mean radius of the wheels of each wheelset [m], shape (n_ws,).
+    """
+    if np.array_equal(radius, train.wheel_radius):
+        return train
+    momentum = train.wheelset_spin_inertia / radius
+    return replace(train, wheel_radius=radius, C_speed=_gyroscopic(train.n, train.wheelset_dof, momentum))
 
 
 def _leaning(full: Assembly, keep: NDArray[np.intp], wheelset_dof: NDArray[np.int32]) -> NDArray[np.float64]:

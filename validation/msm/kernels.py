@@ -306,6 +306,7 @@ def explicit_forces(
 @ti.kernel
 def implicit_and_contact(
     patches: Template,
+    own: Template,
     tick: Ints1,
     dims: Ints1,
     constants: Reals1,
@@ -357,7 +358,7 @@ def implicit_and_contact(
                 uw.stored_rail(0, w, 0, rail_free_out), uw.stored_rail(0, w, 1, rail_free_out), channels, dims,
                 constants, wheel, table, wheelset_compliance, rail_compliance_out, contact_out, force_out,
                 wheelset_force_out, rail_force_out, constants[at.CONTACT_TOLERANCE] * constants[at.STATIC_LOAD],
-                patches,
+                patches, own,
             )  # fmt: skip
         keep_increments(wheelset_force_out, rail_force_out, wheelset_before_out, rail_before_out)
         add_wheels(constants, inverse, shape_out, rail_before_out, rails)

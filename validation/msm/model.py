@@ -85,9 +85,9 @@ class FullTrack:
         groups: Slabs by design, the sound ones first.
         seat: Seat rows of the sound slab as factors of one product: [w, dw/dy] by side, shape (4, m, seats).
         numbers, dims, constants: For the kernels.
-        wheel: r0, b0, spin inertia, shape (W, 3).
+        wheel: Numbers of each wheelset, shape (W, N_WHEEL_NUMBERS).
         vehicle_load: Force per unit rate of speed, gravity, then zeros: no given loads, shape (2 n + n_e + 2 W,).
-        train, contact: Shared with the engine.
+        train, contact, contact_values: Shared with the engine.
         rail, fastening, mortar: Parameters.
         dead_pressure: Weight of a slab on its bed [Pa].
         newmark: Step and coefficients.
@@ -112,6 +112,7 @@ class FullTrack:
     vehicle_load: Reals
     train: TrainModel
     contact: ContactTable
+    contact_values: Reals
     rail: Rail
     fastening: Fastening
     mortar: Mortar
@@ -195,10 +196,11 @@ def build_track(
         numbers=numbers,
         dims=_dims(given),
         constants=_constants(given, _missing(given.rail, L, modes)),
-        wheel=np.stack([given.train.wheel_radius, given.train.half_spacing, given.train.wheelset_spin_inertia], axis=1),
+        wheel=_wheels(given),
         vehicle_load=_loads(given.train),
         train=given.train,
         contact=given.contact,
+        contact_values=given.contact_values,
         rail=given.rail,
         fastening=given.fastening,
         mortar=given.mortar,
@@ -206,6 +208,18 @@ def build_track(
         newmark=given.newmark,
         passes=given.passes,
     )
+
+
+def _wheels(given: Ingredients) -> Reals:
+    """Numbers of each wheelset for the shared kernels of the contact, shape (W, N_WHEEL_NUMBERS)."""
+    train = given.train
+    wheel = np.full((len(train.wheel_radius), at.N_WHEEL_NUMBERS), -1.0)
+    wheel[:, : at.SPIN_INERTIA + 1] = np.stack(
+        [train.wheel_radius, train.half_spacing, train.wheelset_spin_inertia], axis=1
+    )
+    if given.contacts is not None:
+        wheel[:, at.RADIUS_LEFT :] = given.contacts.numbers
+    return wheel
 
 
 def _loads(train: TrainModel) -> Reals:
@@ -346,5 +360,5 @@ def _constants(given: Ingredients, missing: Reals) -> Reals:
     if given.local_compliance:
         c[at.RESIDUAL_VERTICAL : at.RESIDUAL_TORSION + 1] = missing
     c[at.TABLE_U0], c[at.TABLE_DU] = table.u_min, table.du
-    c[at.TABLE_ALPHA0], c[at.TABLE_DALPHA] = table.alpha_min, table.dalpha
+    c[at.TABLE_ALPHA0], c[at.TABLE_DALPHA], c[at.TABLE_ROWS] = table.alpha_min, table.dalpha, len(table.values)
     return c
