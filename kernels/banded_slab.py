@@ -88,6 +88,27 @@ def push_at_seats(
 
 
 @ti.func
+def add_ground_loads(slab: Array, base: int, dofs: int, down: Template, aside: Template, row: int, table: Array):
+    """Add the inertia forces of a group of slabs on moving ground to SLAB_LOAD.
+
+    Args:
+        slab: State of the slabs.
+        base: Place of the group's first coordinate.
+        dofs: N; the last two are lateral displacement and yaw.
+        down: Acceleration of the ground under the slots, downwards [m/s^2].
+        aside: The same to the right.
+        row: Row of the table.
+        table: Inertia force of each coordinate by unit acceleration [kg, kg m].
+    """
+    for i in range(dofs):
+        k = (base + i) * at.SLAB_ROWS + at.SLAB_LOAD
+        a = down
+        if i >= dofs - 2:
+            a = aside
+        slab[k] = slab[k] - table[row, i] * a
+
+
+@ti.func
 def shift(near: Template, newest: Template, K: Template):
     """Put the newest result before the K ones a row couples with."""
     for q in ti.static(range(K - 1)):

@@ -66,8 +66,9 @@ WHEEL_ROWS, WHEEL_COLUMNS, N_WHEEL_FUNCTION = 0, 16, 24
     PASSES,
     LOAD_STEP,  # vectors from a step's row of loads to the next step's, 0 if all have the same
     LOAD_TRAIN,  # from a train's rows to the next train's
+    LOAD_GROUND,  # from a row's first vector to the ground's accelerations, where it moves
     N_SIZE,
-) = range(12)
+) = range(13)
 
 # Entries of ``job`` (int32): what a launch does; with LOOK_EVERY > 0 it looks at the state every so many steps, of
 # which STEPS_BEFORE lie before the chunk, and stops where a guard must check it, with LOOK_ALWAYS at the first look.

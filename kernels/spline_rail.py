@@ -9,6 +9,7 @@ Vector mode (``tiengine.engine.vector_mode``) knows neither ``t -= x`` nor ``-x`
 
 import taichi as ti
 
+from tiengine.kernels import layout
 from tiengine.kernels import spline_layout as at
 from tiengine.kernels.types import Array, Template
 
@@ -110,6 +111,19 @@ def forward(rail: Array, first: int, functions: int, coefficient: Array, initial
             rail[k + 5 * at.FORWARD_RESULT + f] = vertical[f]
         for f in ti.static(range(3)):
             rail[k + 5 * at.FORWARD_RESULT + 2 + f] = lateral[f]
+
+
+@ti.func
+def add_ground_loads(rail: Array, first: int, functions: int, step: int, clock: Array, lanes: Template):
+    """Add the inertia forces of a track on moving ground, which the host has summed up, to SEAT_LOAD.
+
+    They stand in ``clock`` behind its own columns: on w of all functions, then on v.
+    """
+    for i in range(functions):
+        k = (first + i) * at.RAIL_ROWS
+        every = ti.Vector.one(ti.f64, lanes)
+        rail[k + at.LOAD_W] = rail[k + at.LOAD_W] + clock[step, layout.N_CLOCK + i] * every
+        rail[k + at.LOAD_V] = rail[k + at.LOAD_V] + clock[step, layout.N_CLOCK + functions + i] * every
 
 
 @ti.func

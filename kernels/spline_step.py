@@ -68,7 +68,7 @@ def sweep_slabs(
             slabs.clear_loads(slab, base, dofs)
 
 
-def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, own: int) -> Any:
+def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, moving: int, own: int) -> Any:
     """Make the kernel.
 
     Args:
@@ -77,6 +77,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, own:
         blocks: Vectors in a row of a car.
         patches: Patches a wheel.
         shaped: 1 if rails have shapes or wheels are out of round.
+        moving: 1 if the ground moves in time.
         own: 1 if wheels have radii and contact tables of their own.
     """
     lane_vectors = ti.types.ndarray(dtype=ti.types.vector(lanes, ti.f64), ndim=1)
@@ -149,7 +150,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, own:
         bed_lateral_K: Reals3,
         bed_lateral_C: Reals3,
         bed_numbers: Reals1,
-        bed_motion: Reals2,
+        slab_rows: Reals2,  # u, v, F of a copy of a slab; its inertia force by unit acceleration of the ground
         pressure: Reals3,
     ):
         """Steps of all chunks, chunk by chunk. Arrays as in ``tiengine.engine.spline_step``."""
@@ -207,6 +208,8 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, own:
                         lanes,
                     )  # fmt: skip
                 if stages & at.FORWARD_STAGE:
+                    if ti.static(moving == 1):
+                        spline_rail.add_ground_loads(rail, first, n, step, clock, lanes)
                     if p == 0:
                         spline_rail.forward(rail, first, n, coefficient, 1, lanes)
                     else:
@@ -261,6 +264,14 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, own:
                             slab, g * (dofs + 2 * K) + K, dofs, g * at.SLAB_SEAT_ROWS * per_slab, per_slab,
                             slab_seat_index, slab_seat_shape, slab_seat_x, slab_seat,
                         )  # fmt: skip
+                    if ti.static(moving == 1):
+                        for b in range(b0, b_end):
+                            row = cars.load_row(b, step, size, blocks) + size[at.LOAD_GROUND]
+                            for g in range(groups):
+                                slabs.add_ground_loads(
+                                    slab, (b * groups + g) * (dofs + 2 * K) + K, dofs, car_load[row + g],
+                                    car_load[row + groups + g], 3, slab_rows,
+                                )  # fmt: skip
                     if dims[layout.MORTAR_MODE] > 0:
                         for b in range(b0, b_end):
                             for slot in range(dims[layout.SLOTS]):
@@ -268,7 +279,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, own:
                                 slabs.bed_forces(
                                     b, slot, group * (dofs + 2 * K) + K, row_u, row_v, dofs,
                                     ti.cast(slab_design[group][slot % 8], ti.i32), bed_index, bed_shape, bed_weight,
-                                    bed_factor, bed_rest, bed_lateral_K, bed_lateral_C, bed_numbers, slab, bed_motion,
+                                    bed_factor, bed_rest, bed_lateral_K, bed_lateral_C, bed_numbers, slab, slab_rows,
                                     pressure,
                                 )  # fmt: skip
                     for b in range(b0, b0 + trains_a_chunk):

@@ -229,7 +229,7 @@ BAN = (DATA / "head.ban").read_text()
         ("a.prr", GOOD.replace("0.3125      1.0", "nan"), r"line 15: point 2 is \(-1.5, nan\); finite"),
         ("a.prr", GOOD.replace("1.0e+02", "0"), "line 10: units.len.f = 0: must be > 0"),
         ("a.prr", GOOD.replace("1.0e+02", "wide"), "line 10: units.len.f = 'wide': must be a number"),
-        ("a.prr", GOOD.replace("1.0e+02", "1.0"), "6000 mm wide; 10 to 400 mm expected: are its units right"),
+        ("a.prr", GOOD.replace("1.0e+02", "1.0"), "6000 mm wide; 20 to 400 mm expected: are its units right"),
         ("a.prr", GOOD.replace("0.3125      1.0", "1e300"), "line 15: z lies 1e[+]301 mm from the other points'"),
         ("a.prr", GOOD.replace("= -1.0  ", "= __import__('os')"), r"line 8: shift.y = \"__import__"),
         ("a.ban", BAN.replace("XYPoints=13", "XYPoints=14"), "line 19: 13 points; XYPoints = 14 are expected"),
@@ -241,7 +241,7 @@ BAN = (DATA / "head.ban").read_text()
         ("a.txt", "0 0\n1\0 0\n", "line 2: not a text file"),
         ("a.txt", "\n".join(f"{i}, {i}" for i in range(20)) + "\n19, 0", "line 21: y goes from 19 to 19 at point 21"),
         ("a.txt", "\n".join(f"{-i}, 0" for i in (0, 1, 2, 1.5, 4)), "line 4: .* point 4; y must decrease"),
-        ("a.txt", "\n".join(f"{i}, 0" for i in range(0, 5000, 100)), "4900 mm wide; 10 to 400 mm expected"),
+        ("a.txt", "\n".join(f"{i}, 0" for i in range(0, 5000, 100)), "4900 mm wide; 20 to 400 mm expected"),
     ],
 )
 def test_broken_files_are_named(tmp_path, name, text, message):

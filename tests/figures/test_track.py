@@ -10,6 +10,7 @@ import pytest
 
 from tiengine.figures import envelopes, gauges, waterfall
 from tiengine.indices.extremes import read_extremes
+from tiengine.indices.key_figures import key_figures
 from tiengine.indices.train_record import AbsentError, Train
 from tiengine.result import Result
 
@@ -19,9 +20,9 @@ FAILED = slice(160, 163)
 QUIET = np.zeros((2000, 4, 2))  # 2 s, 194 m: the train stands at 14 m first, 208.3 m last
 
 
-def track(path: Path, seats: dict, slabs: dict) -> Result:
+def track(path: Path, seats: dict, slabs: dict, **changes) -> Result:
     """A run over 194 m with these extremes."""
-    return by.made(path, by.scenario(), {"wheel": by.wheel(QUIET, QUIET), "seats": seats, "slabs": slabs})
+    return by.made(path, by.scenario(**changes), {"wheel": by.wheel(QUIET, QUIET), "seats": seats, "slabs": slabs})
 
 
 def line(axes, **look):
@@ -64,6 +65,29 @@ def test_envelopes_are_those_of_the_file(tmp_path):
     mortar = next(axes[title] for title in axes if title.startswith("Mortar: "))
     x, values = line(mortar, linestyle="-")
     assert values[x == 24.5 * by.SLAB] == pytest.approx([80.0])
+
+
+def test_shapes_of_rails_and_ground_are_drawn_beneath(tmp_path):
+    """A settlement and a weld of the left rail in mm over chainage, down positive; nothing where a file has gone."""
+    ground = [{"kind": "cosine", "at": 100.0, "length": 40.0, "depth": 0.012}]
+    weld = [{"kind": "weld", "rail": "left", "at": 60.0, "length": 1.0, "depth": 5e-4}]
+    seats, slabs = by.seats(400), by.slabs(45)
+    with track(
+        tmp_path / "a.h5", seats, slabs, train__distance=194.0, track__ground=ground, track__rail_shapes=weld
+    ) as result:
+        figure = envelopes.draw(result)
+        figures = {figure.name: figure for figure in key_figures(Train(result))}
+    rails, ground = figure.axes[-2:]
+    x, values = line(rails, linestyle="-")
+    assert values[np.argmin(np.abs(x - 60.0))] == pytest.approx(0.5, rel=0.02)  # the patch's filter rounds it
+    assert not line(rails, linestyle="--")[1].any()
+    x, values = line(ground, linestyle="-")
+    assert x[np.argmax(values)] == pytest.approx(100.0, abs=0.2)
+    assert values.max() == pytest.approx(12.0, rel=1e-4)
+    assert ground.yaxis_inverted()
+    assert figures["largest vertical displacement of the ground"].value == pytest.approx(12.0, rel=1e-4)
+    with track(tmp_path / "b.h5", seats, slabs, track__ground=[{"kind": "file", "file": "no.csv"}]) as bare:
+        assert len(envelopes.draw(bare).axes) == 4
 
 
 def test_load_shed_to_the_neighbours(tmp_path):

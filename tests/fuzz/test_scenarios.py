@@ -48,6 +48,7 @@ BASE: dict[str, Any] = {
         "mortar_voids": [{"slab": 5, "x": [0.5, 1.0], "y": [-0.5, 0.5]}],
         "rail_shapes": [{"kind": "weld", "at": 60.0, "length": 1.0, "depth": 2e-4}],
         "ground": [{"kind": "angles", "at": 70.0, "length": 12.0, "depth": 5e-3, "lateral": -1e-3}],
+        "base_motion": {"file": "quake.csv", "start": 0.5, "wave_speed": 500.0, "at": 20.0},
     },
     "irregularity": {"spectrum": "german_low", "seed": 3},
     "wind": {"speed": 5.0, "gust": "en14067", "gust_at": 60.0},

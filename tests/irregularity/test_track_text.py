@@ -136,6 +136,10 @@ HEIGHTS = [0.0, 0.1, -0.2, 0.3, 0.1]
         "x [m]   vertical [mm]\n" + "".join(f"  {x}  {z}\n" for x, z in enumerate(HEIGHTS)),
         "x  vertical [mm]\n" + "".join(f"{x} {z}\n".replace(".", ",") for x, z in enumerate(HEIGHTS)),
         "Car 7; run of 3 May\nDistance (m);Vertical (mm)\n" + "".join(f"{x};{z}\n" for x, z in enumerate(HEIGHTS)),
+        "x [m],vertical [mm],\n" + "".join(f"{x},{z}\n" for x, z in enumerate(HEIGHTS)),
+        "X [M],VERTICAL [MM]\n" + "".join(f"{x},{z}\n" for x, z in enumerate(HEIGHTS)),
+        "sep=;\nx [m];vertical [mm]\n" + "".join(f"{x};{z}\n" for x, z in enumerate(HEIGHTS)),
+        "x,vertical [mm]\n" + "".join(f"km 0 + {x:03d},{z}\n" for x, z in enumerate(HEIGHTS)),
         "x,vertical\n[m],[mm]\n" + "".join(f"{x},{z}\n" for x, z in enumerate(HEIGHTS)),
         "% by hand\nkm,m,vertical [mm]\n" + "".join(f"0,{x},{z}\n" for x, z in enumerate(HEIGHTS)),
         'x,"vertical [mm]"\n' + "".join(f'{x},"{z}"\n'.replace(".", ",") for x, z in enumerate(HEIGHTS)),
@@ -211,3 +215,20 @@ def test_the_file_is_described_by_params():
     """The run reports and records how the file was read."""
     params = IrregularityParams(file=str(DATA / "gaps.csv"), file_bridge=1.0)
     assert make_irregularity(params, 0.0).description.startswith("gaps.csv: read as UTF-8, separated by commas")
+
+
+@pytest.mark.parametrize("column", ["vertical", "alignment", "gauge"])
+def test_millimetres_taken_for_metres_are_refused(tmp_path: Path, column: str) -> None:
+    """Waves of 20 m and 0.3 mm would be 0.3 m high; a hill of 1 m in 40 m is a track."""
+    x = np.arange(0.0, 80.0, 0.25)
+    path = tmp_path / "track.csv"
+    for height, length, unit in ((0.4, 20.0, "m"), (0.5, 80.0, "m"), (0.4, 20.0, "mm")):
+        z = height * np.sin(2.0 * np.pi * x / length)
+        path.write_text(f"x,{column} [{unit}]\n" + "".join(f"{a},{b:.5f}\n" for a, b in zip(x, z, strict=True)))
+        if (length, unit) == (20.0, "m"):
+            with pytest.raises(
+                InputError, match=r"changes by 0.125 m within 1 m; at most 0.1 m .* are its units right"
+            ):
+                read_series(path)
+        else:
+            read_series(path)

@@ -30,6 +30,14 @@ SHORTER = {
         "in (8, 20)": "in (20,)",
     },
     "gust": {"distance = 160.0": "distance = 12.0", "run_in = 20.0": "run_in = 1.0"},
+    "settlement_at_a_pier": {
+        "distance = 130.0": "distance = 12.0",
+        "start = 60.0": "start = 105.0",
+        "taper = 10.0": "taper = 1.0",
+        "run_in = 10.0": "run_in = 1.0",
+        "[0] + 10.0": "[0] + 1.0",
+        "in (0.010, 0.020)": "in (0.010,)",
+    },
     "own_profiles": {"distance = 150.0": "distance = 5.0"},
     "hundred_trains": {
         "size = 100 ": "size = 4 ",

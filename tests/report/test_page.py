@@ -245,6 +245,20 @@ def test_a_scenario_in_words():
     assert smooth["Trains"] == "3 realisations of the irregularity, train.speed_kmh in 3 values"
 
 
+def test_words_on_the_ground():
+    ground = [
+        {"kind": "angles", "at": 100.0, "length": 20.0, "depth": 0.01, "lateral": -0.002},
+        {"kind": "file", "file": "levels.csv", "scale": 2.0},
+    ]
+    changes = {"track.ground": ground, "track.base_motion": {"file": "quake.csv", "wave_speed": 500.0, "start": 1.0}}
+    words = dict(scenario_words(load_scenario("default", changes)))["Ground"]
+    assert words == (
+        "displaced 10 mm down and 2 mm to the left, two ramps that meet over 20 m at chainage 100 m; displaced by"
+        " levels.csv, times 2; moving in time by quake.csv, travelling at 500 m/s, from 1 s on"
+    )
+    assert "Ground" not in dict(scenario_words(load_scenario("default")))
+
+
 def test_unfinished_files_are_drawn(tmp_path, few_figures):
     """An unfinished run: its results so far, with a notice."""
     with by.made(tmp_path / "a.h5", by.scenario(), groups(300), status=RUNNING) as result:

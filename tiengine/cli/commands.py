@@ -6,9 +6,11 @@ import Taichi, so that the others start fast.
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import signal
+import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -30,6 +32,9 @@ class _Commands(click.Group):
 
     def invoke(self, context: click.Context) -> Any:
         """Run a command."""
+        if sys.stdout is None or sys.stderr is None:  # closed by whoever started this process
+            nowhere = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - until the process ends
+            sys.stdout, sys.stderr = sys.stdout or nowhere, sys.stderr or nowhere
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("always", InputNote)
@@ -46,6 +51,11 @@ class _Commands(click.Group):
         except InputError as error:
             click.echo(f"error: {' '.join(str(error).split())}", err=True)
             context.exit(2)
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EIO, errno.EDQUOT) or error.filename is not None:
+                raise
+            click.echo(f"error: standard output: {error.strerror}", err=True)
+            context.exit(1)
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -122,6 +132,7 @@ def profile(
 @click.option("--half-spacing", type=float, default=0.7465, show_default=True, help="Of the tape circles [m].")
 @click.option("--wheel-radius", type=float, default=0.43, show_default=True, help="At the tape circle [m].")
 @click.option("--tape-circle", type=float, help="Distance of the tape circle outward from the wheel file's y = 0 [m].")
+@click.option("--rail-axis", type=float, help="The rail file's y at the axis of an upright rail [m].")
 @click.option("--allow-kinks", is_flag=True, help="Accept kinks where wheel and rail can touch.")
 @click.option("--mirror-rail/--no-mirror-rail", default=None, help="The rail's gauge face is at positive y, or not.")
 @click.option("--smoothing", type=click.FloatRange(0.0, 5e-3), help="Of points; 0.0005 for measured profiles [m].")
@@ -143,6 +154,7 @@ def contact(
     as_json: bool,
     canted: bool | None,
     tape_circle: float | None,
+    rail_axis: float | None,
     allow_kinks: bool,
     mirror_rail: bool | None,
     smoothing: float | None,
@@ -175,7 +187,13 @@ def contact(
 
     def rail_of(name: str) -> Profile:
         return load_profile(
-            name, "rail", smoothing=length, has_cant=canted, mirror=mirror_rail, allow_kinks=allow_kinks
+            name,
+            "rail",
+            smoothing=length,
+            has_cant=canted,
+            mirror=mirror_rail,
+            allow_kinks=allow_kinks,
+            rail_axis=rail_axis,
         )
 
     report = contact_report(

@@ -1,8 +1,9 @@
 """Reader of profiles in columns of text: y and z, with what spreadsheets and other programs add to them.
 
-``#``, ``%``, ``!`` and ``//`` begin comments; y rises or falls from line to line. Understood and reported: a header
-row, which may name the columns and a unit (``y [mm]; z [mm]``), a first row with the number of points, a first column
-that counts the points, decimal commas, words behind the numbers, repeated points.
+``#``, ``%``, ``!`` and ``//`` begin comments; y rises or falls from line to line. Understood and reported: lines of
+words above the points, which may name the columns and their units (``y [mm]; z [mm]``, or the units in a line below), a
+first row with the number of points, a first column that counts the points, decimal commas, words behind the numbers,
+repeated points. Cells may be quoted.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tiengine.contact.number_rows import has_decimal_commas, leading_numbers, split_row
+from tiengine.contact.number_rows import has_decimal_commas, leading_numbers, split_row, unquoted
 from tiengine.contact.point_list import FEWEST_POINTS, Kind, PointList, point_list, without_repeats
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
@@ -24,8 +25,10 @@ Lines = Sequence[tuple[int, str]]
 """Numbered lines."""
 
 COMMENT = re.compile(r"#|%|!|//")
-HEADER_UNIT = re.compile(r"[\[(]\s*(mm|m|in|inch|inches)\s*[\])]", flags=re.IGNORECASE)
-MILLIMETRES = {"mm": 1.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "inches": 25.4}
+MILLIMETRES = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "inches": 25.4}
+HEADER_UNIT = re.compile(rf"[\[(/_]\s*({'|'.join(MILLIMETRES)})\s*(?:[\])]|$|(?=[\s,;]))", flags=re.IGNORECASE)
+HEADER_WORD = re.compile(r"[^\W\d_]{3,}[.:]*")
+"""A line that begins with such a word is no point, whatever numbers follow."""
 LATERAL, VERTICAL = {"y", "lateral"}, {"z", "vertical", "height"}
 WIDEST = 0.4  # m: a narrower list holds metres
 Row = tuple[int, str, list[str], list[float]]
@@ -46,7 +49,7 @@ def read_columns(lines: Lines, kind: Kind, where: str) -> PointList:
     Raises:
         InputError: A row that is not understood, or y that turns back.
     """
-    texts = [(number, COMMENT.split(line)[0].strip()) for number, line in lines]
+    texts = [(number, unquoted(COMMENT.split(line)[0].strip())) for number, line in lines]
     decimal_commas = has_decimal_commas([text for _, text in texts])
     rows: list[Row] = []
     for number, text in texts:
@@ -56,13 +59,13 @@ def read_columns(lines: Lines, kind: Kind, where: str) -> PointList:
     header, rows = _without_header(rows, notes)
     rows = _without_count(rows, where, notes)
     values = _two_columns(rows, where, notes)
-    names = [word.lower() for word in re.findall(r"[A-Za-z]+", HEADER_UNIT.sub("", header))]
-    if len(names) == 2 and names[0] in VERTICAL and names[1] in LATERAL:
-        values = [row[::-1] for row in values]
+    scale = _units(header, where)
+    exchanged = any(_exchanged(text) for text in header)
+    if exchanged:
         notes.append("columns are exchanged as the header row names them")
-    found = without_repeats(point_list(values, [row[0] for row in rows], where, tuple(notes)))
-    unit = HEADER_UNIT.search(header)
-    found = replace(found, points=found.points * MILLIMETRES[unit[1].lower()]) if unit else in_millimetres(found)
+    listed = point_list(values, [row[0] for row in rows], where, tuple(notes))
+    found = without_repeats(replace(listed, points=listed.points * scale) if scale else in_millimetres(listed))
+    found = replace(found, points=found.points[:, ::-1]) if exchanged else found
     _check_order(found)
     return found
 
@@ -77,14 +80,40 @@ def in_millimetres(found: PointList) -> PointList:
     return replace(found, points=found.points * 1e3) if in_metres else found
 
 
-def _without_header(rows: list[Row], notes: list[str]) -> tuple[str, list[Row]]:
-    """Text of a first row without numbers, and the other rows."""
-    if len(rows) < 2 or rows[0][3] or not rows[1][3] or any(leading_numbers([field]) for field in rows[0][2]):
-        return "", rows
-    if any(re.match(r"[+-]?[.,]?\d", field) for field in rows[0][2]):
-        return "", rows  # a point with a slip of the pen, not a header
-    notes.append(f"line {rows[0][0]} is read as a header row")
-    return rows[0][1], rows[1:]
+def _without_header(rows: list[Row], notes: list[str]) -> tuple[list[str], list[Row]]:
+    """Texts of the first rows, which hold words, and the other rows."""
+    count = next((i for i, row in enumerate(rows) if row[3]), 0)
+    if not count or any(_is_slip(row) for row in rows[:count]):
+        return [], rows
+    first, last = rows[0][0], rows[count - 1][0]
+    notes.append(
+        f"line {first} is read as a header row" if count == 1 else f"lines {first} to {last} are read as header rows"
+    )
+    return [row[1] for row in rows[:count]], rows[count:]
+
+
+def _is_slip(row: Row) -> bool:
+    """Whether a row without a number at its beginning is a point with a slip of the pen rather than a header."""
+    numbers = any(leading_numbers([field]) or re.match(r"[+-]?[.,]?\d", field) for field in row[2])
+    return numbers and not HEADER_WORD.fullmatch(row[2][0])
+
+
+def _units(header: list[str], where: str) -> list[float]:
+    """Millimetres in the units of both columns; empty where the header states none."""
+    found = [unit.lower() for text in header for unit in HEADER_UNIT.findall(text)]
+    for text in header:
+        words = [word.lower() for word in re.findall(r"[^\W\d_]+", text)]
+        if words and all(word in MILLIMETRES for word in words):
+            found += words
+    if len(set(found)) > 1 and len(found) != 2:
+        raise InputError(f"{where}: the header states the units {', '.join(found)}; one for y and one for z expected")
+    return [MILLIMETRES[unit] for unit in (found * 2 if len(set(found)) == 1 else found)[:2]]
+
+
+def _exchanged(text: str) -> bool:
+    """Whether a row of the header names z before y."""
+    names = [word.lower() for word in re.findall(r"[A-Za-z]+", HEADER_UNIT.sub("", text))][-2:]
+    return len(names) == 2 and names[0] in VERTICAL and names[1] in LATERAL
 
 
 def _without_count(rows: list[Row], where: str, notes: list[str]) -> list[Row]:

@@ -100,6 +100,8 @@ def _points(body: _Body, header: dict[str, str], lines: Lines, where: str) -> Po
     if promised and promised[0] > len(body.rows) + quoted:
         last = body.lines[-1] if body.lines else len(lines)
         raise InputError(f"{where}: line {last}: {len(body.rows)} points; XYPoints = {promised[0]:g} are expected")
+    if promised and promised[0] < len(body.rows):
+        body.notes.append(f"XYPoints = {promised[0]:g}, and {len(body.rows)} points follow, which are all read")
     if quoted:
         body.notes.append(f"{quoted} point(s) quoted out in the file are left out")
     rows = [[row[column] for column in columns] for row in body.rows]

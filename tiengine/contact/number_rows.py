@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 from tiengine.parameters.input_files import numbers_of
 
-__all__ = ["has_decimal_commas", "leading_numbers", "split_row"]
+__all__ = ["has_decimal_commas", "leading_numbers", "split_row", "unquoted"]
 
 NUMBER = re.compile(r"[+-]?(\d[\d.,]*|[.,]\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf)", flags=re.ASCII | re.IGNORECASE)
+QUOTED_ROW = re.compile(r'\s*"[^"]*"(\s*[;,\t ]\s*"[^"]*")*\s*[;,]?\s*')
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eEdD][+-]?\d+)?", flags=re.ASCII)
 FORTRAN_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")
 
@@ -34,6 +35,17 @@ def has_decimal_commas(texts: Sequence[str]) -> bool:
         and not any("." in token for token in tokens)
         and not any("," in token for token in single)
     )
+
+
+def unquoted(text: str) -> str:
+    """A row without the quotation marks of its cells, which may hold commas that do not separate.
+
+    Args:
+        text: Row without comments.
+    """
+    if QUOTED_ROW.fullmatch(text):
+        return "; ".join(re.findall(r'"([^"]*)"', text))
+    return text.replace('"', "")
 
 
 def split_row(text: str, decimal_commas: bool) -> list[str]:

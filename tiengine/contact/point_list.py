@@ -57,6 +57,7 @@ class Placement:
         mirror: Whether a rail's gauge face is at the list's positive y.
         tape_circle: Distance of a wheel's tape circle outward from the list's y = 0 [m].
         allow_kinks: Whether kinks of the running surface are accepted.
+        rail_axis: The list's y at the axis of an upright rail [m].
     """
 
     has_cant: bool | None = None
@@ -64,6 +65,7 @@ class Placement:
     mirror: bool | None = None
     tape_circle: float | None = None
     allow_kinks: bool = False
+    rail_axis: float | None = None
 
 
 def point_list(rows: list[list[float]], numbers: list[int], where: str, notes: tuple[str, ...] = ()) -> PointList:

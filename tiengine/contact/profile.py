@@ -200,6 +200,7 @@ def load_profile(
     mirror: bool | None = None,
     tape_circle: float | None = None,
     allow_kinks: bool = False,
+    rail_axis: float | None = None,
 ) -> Profile:
     """Load a profile of the library or of a file (formats: :mod:`tiengine.contact.profile_files`).
 
@@ -211,6 +212,7 @@ def load_profile(
         mirror: Whether a rail's gauge face is at the file's positive y; None if not stated.
         tape_circle: Distance of a wheel's tape circle outward from the file's y = 0 [m]; None if not stated.
         allow_kinks: Accept kinks where wheel and rail can touch.
+        rail_axis: The file's y at the axis of an upright rail [m]; None if not stated.
 
     Returns:
         The profile in metres.
@@ -226,7 +228,7 @@ def load_profile(
         path = Path(name)
     else:
         raise InputError(f"{kind} profile {name!r}: neither a file nor a preset{nearest(name, profile_names())}")
-    stated = Placement(has_cant, smoothing, mirror, tape_circle, allow_kinks)
+    stated = Placement(has_cant, smoothing, mirror, tape_circle, allow_kinks, rail_axis)
     found = read_profile(path, kind, f"{kind} profile {name!r}")
     points = placed(found, kind, stated)
     check_kinks(mirrored(found, kind, stated), kind, stated)

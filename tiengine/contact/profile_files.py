@@ -24,7 +24,8 @@ from tiengine.parameters.input_files import LARGEST_PROFILE, read_text_file
 __all__ = ["FORMATS", "MOST_POINTS", "read_profile"]
 
 MOST_POINTS = 20_000  # laser scans have some thousand
-WIDTH = (10.0, 400.0)  # mm, range of widths
+WIDTH = {"wheel": (50.0, 400.0), "rail": (20.0, 400.0)}  # mm: a tread with its flange, half a head
+HIGHEST = 400.0  # mm by which a point may stand out from the others
 MOST_NOTES = 5  # of one file
 
 
@@ -50,17 +51,18 @@ def read_profile(path: str | Path, kind: Kind, where: str = "") -> PointList:
     if len(found.points) > MOST_POINTS:
         raise InputError(f"{where}: {len(found.points)} points; at most {MOST_POINTS} expected")
     width = float(np.ptp(found.points[:, 0]))
-    if not WIDTH[0] <= width <= WIDTH[1]:
+    least, most = WIDTH[kind]
+    if not least <= width <= most:
         raise InputError(
-            f"{where}: {width:g} mm wide; {WIDTH[0]:g} to {WIDTH[1]:g} mm expected: are its units right?"
+            f"{where}: {width:g} mm wide; {least:g} to {most:g} mm expected: are its units right?"
             " A header row such as 'y [in]; z [in]' states the unit of columns of text"
         )
     away = np.abs(found.points[:, 1] - np.median(found.points[:, 1]))
-    if away.max() > WIDTH[1]:
+    if away.max() > HIGHEST:
         i = int(np.argmax(away))
         raise InputError(
             f"{where}: line {found.lines[i]}: z lies {away[i]:g} mm from the other points';"
-            f" at most {WIDTH[1]:g} mm expected"
+            f" at most {HIGHEST:g} mm expected"
         )
     for note in found.notes[:MOST_NOTES]:
         warnings.warn(f"{where}: {note}", InputNote, stacklevel=2)

@@ -9,6 +9,7 @@ elsewhere than its tape circle; a railhead that is inclined leans towards its in
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,7 @@ HEAD_INCLINATION = 1.0 / 80.0  # of the head at the list's y = 0: half of the sm
 MIDDLE_INCLINATION = 1.0 / 60.0  # of the head's middle, which uneven sides move by a few mm on R300
 HEAD_LEVEL = 10.0  # mm below the top, where the middle of a railhead is taken
 HEAD_CHORD = 10.0  # mm to either side of the middle, over which its inclination is measured
+OFF_AXIS = 15.0  # mm by which the middle of a worn head may lie beside the rail's axis
 SHALLOW = 3.0  # mm: heads that reach less deep below their top are too flat to tell their inclination
 RESAMPLED_STEP = 0.1  # mm
 LARGEST = 1e4  # mm
@@ -94,6 +96,9 @@ def placed(listed: PointList, kind: Kind, stated: Placement) -> Reals:
         InputError: Too few or too large points, or a shape that contradicts what is stated or assumed.
     """
     where, points = listed.where, mirrored(listed, kind, stated).points
+    for key in ("rail_axis", "has_cant") if kind == "wheel" else ("tape_circle",):
+        if (value := getattr(stated, key)) is not None:
+            raise InputError(f"{where}: {key} = {str(value).lower()}: not for a {kind}")
     if len(points) < FEWEST_POINTS or not (np.abs(points) < LARGEST).all():
         raise InputError(
             f"{where}: {len(points)} points up to {np.abs(points).max(initial=0.0):g} mm; at least {FEWEST_POINTS}"
@@ -109,7 +114,8 @@ def placed(listed: PointList, kind: Kind, stated: Placement) -> Reals:
     if kind == "wheel":
         return _placed_wheel(points, where, stated) * 1e-3
     rail = _placed_rail(points, where, stated)
-    return (points if stated.has_cant else rail) * 1e-3
+    axis = _axis(points, where, stated)
+    return (points if stated.has_cant else rail - [axis, 0.0]) * 1e-3
 
 
 def _check_tape_circle(points: Reals, where: str, tape_circle: float) -> None:
@@ -173,6 +179,41 @@ def _placed_rail(points: Reals, where: str, stated: Placement) -> Reals:
     return points - [0.0, top] if abs(top) > ORIGIN else points
 
 
+def _axis(points: Reals, where: str, stated: Placement) -> float:
+    """Place of an upright rail's axis in a list that may be mirrored [mm]."""
+    if stated.rail_axis is not None:
+        if stated.has_cant:
+            raise InputError(f"{where}: rail_axis = {stated.rail_axis:g}: only for upright rails, has_cant is true")
+        return 1e3 * stated.rail_axis * (-1.0 if stated.mirror else 1.0)
+    head = None if stated.has_cant else _head(points)  # an inclined rail's crown is where its tangent is inclined
+    if head is not None and abs(head.middle) > OFF_AXIS:
+        middle = head.middle * (-1.0 if stated.mirror else 1.0)
+        raise InputError(
+            f"{where}: the middle of the head lies at y = {middle:.1f} mm; within {OFF_AXIS:g} mm of the rail's axis"
+            " expected: state rail_axis, the y of the axis in the file"
+        )
+    return 0.0
+
+
+class _Head(NamedTuple):
+    """Middle of a railhead at a level, and half the chord over which its inclination is measured [mm]."""
+
+    middle: float
+    half: float
+
+
+def _head(points: Reals) -> _Head | None:
+    """Where a head's sides are equally deep; None if it is too shallow to tell."""
+    y, z = points.T
+    top = int(np.argmin(z))
+    level = min(HEAD_LEVEL, z[0] - z[top], z[-1] - z[top])
+    if level < SHALLOW:
+        return None
+    inner = np.flatnonzero(z[: top + 1] >= z[top] + level)[-1]
+    outer = top + np.flatnonzero(z[top:] >= z[top] + level)[0]
+    return _Head(0.5 * float(y[inner] + y[outer]), min(HEAD_CHORD, 0.3 * float(y[outer] - y[inner])))
+
+
 def _head_slope(points: Reals) -> float:
     """Slope dz/dy of an inclined railhead; 0 if it stands upright or is too shallow to tell.
 
@@ -180,13 +221,10 @@ def _head_slope(points: Reals) -> float:
     highest point lies outward by R times the inclination.
     """
     y, z = points.T
-    top = int(np.argmin(z))
-    level = min(HEAD_LEVEL, z[0] - z[top], z[-1] - z[top])
-    if level < SHALLOW:
+    head = _head(points)
+    if head is None:
         return 0.0
-    inner = np.flatnonzero(z[: top + 1] >= z[top] + level)[-1]
-    outer = top + np.flatnonzero(z[top:] >= z[top] + level)[0]
-    middle, half = 0.5 * float(y[inner] + y[outer]), min(HEAD_CHORD, 0.3 * float(y[outer] - y[inner]))
+    middle, half = head
 
     def slope(place: float) -> float:
         low, high = np.interp([place - half, place + half], y, z)

@@ -72,7 +72,7 @@ def find_contacts(wheel: Profile, rail: Profile, offset: float, u: ArrayLike, al
         Contacts of the common shape of u and alpha.
 
     Raises:
-        InputError: The wheel is not above the rail, or touches at the very end of its profile.
+        InputError: The wheel is not above the rail, or touches at the very end of one of the profiles.
     """
     shift, tilt = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(alpha, dtype=np.float64))
     flat_u, flat_alpha = shift.ravel() + offset, tilt.ravel()
@@ -216,6 +216,7 @@ def _candidates(
         best = F.max(axis=1, keepdims=True)
         inner = F[:, 1:-1]
         peak = (inner >= F[:, :-2]) & (inner > F[:, 2:]) & (inner > best - band)
+        peak &= np.isfinite(F[:, :-2]) & np.isfinite(F[:, 2:])  # not at the end of the rail's points
         row, column = np.nonzero(peak)
         cases.append(row + start)
         stations.append(s[column + 1])

@@ -27,19 +27,24 @@ def fill_pressures(model: Model, chunk: Chunk) -> None:
         chunk: ``slab`` and ``rear_slab`` are read, ``mortar`` is filled.
     """
     (k, c), rows = model.bed_numbers[:2], chunk.filled
-    kinds = designs_in_slots(model.ingredients.designs.of_slab, chunk.rear_slab[:rows], chunk.mortar.shape[2]).ravel()
+    kinds = designs_in_slots(model.ingredients.designs.of_slab, chunk.rear_slab[:rows], chunk.mortar.shape[2])
     factor, at_rest = (values.reshape(len(values), -1) for values in (model.bed_factor, model.bed_rest))
+    even = all((values == values[0, 0]).all() for values in (factor, at_rest)) and factor[0, 0] == 1.0
+    together = max(BLOCK // chunk.mortar.shape[2], 1)
     for motion, out in zip(chunk.slab, chunk.mortar, strict=True):
-        moved = k * motion[:rows, 0] + c * motion[:rows, 1]
-        slabs, extremes = moved.reshape(len(kinds), moved.shape[-1]), out.reshape(-1, 2)
-        for first in range(0, len(kinds), BLOCK):
-            part = slice(first, first + BLOCK)
-            kind = kinds[part]
-            pressure = slabs[part] @ model.bed_points
-            pressure *= factor[kind]
-            pressure += at_rest[kind]
-            pressure.max(axis=1, out=extremes[part][: len(kind), 0])
-            pressure.min(axis=1, out=extremes[part][: len(kind), 1])
+        for first in range(0, rows, together):
+            here = slice(first, min(first + together, rows))
+            moved = k * motion[here, 0] + c * motion[here, 1]
+            pressure = moved.reshape(-1, moved.shape[-1]) @ model.bed_points
+            if even:
+                pressure += at_rest[0, 0]
+            else:
+                kind = kinds[here].ravel()
+                pressure *= factor[kind]
+                pressure += at_rest[kind]
+            extremes = out[here].reshape(-1, 2)
+            pressure.max(axis=1, out=extremes[:, 0])
+            pressure.min(axis=1, out=extremes[:, 1])
 
 
 def designs_in_slots(of_slab: Mapping[int, int], rear_slab: Ints, slots: int) -> Ints:

@@ -18,7 +18,7 @@ class Chunk:
     """Buffers of a number of steps; the same for every kind of step.
 
     Attributes:
-        clock: Window at the end of each step, shape (steps, N_CLOCK).
+        clock: Window at the end of each step, shape (steps, N_CLOCK or more: loads of rails where the ground moves).
         irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
         wheel: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL_RECORD).
         body: Recorded displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
@@ -44,7 +44,7 @@ class Chunk:
         train, B = ingredients.train, ingredients.trains
         W, bodies, rows, slots = len(train.wheelset_x), len(train.body_names), max(body_rows, 1), ingredients.slots
         return cls(
-            clock=np.zeros((steps, at.N_CLOCK)),
+            clock=np.zeros((steps, at.N_CLOCK + ingredients.rail_loads)),
             irregularity=np.zeros((B, steps, W, ingredients.channels)),
             wheel=np.zeros((B, steps, W, 2, at.N_WHEEL_RECORD[ingredients.contact.patches])),
             body=np.zeros((B, rows, 3, 5 * bodies)),

@@ -126,6 +126,7 @@ class SplineStep:
         slab_record: Floats,
         bed: Bed,
         loads: LoadRows,
+        slab_inertia: Floats | None = None,
     ):
         """Bind.
 
@@ -140,14 +141,16 @@ class SplineStep:
             slabs: Tables of the slabs.
             suspension: Nonlinear elements.
             contact: Arrays of the contact.
-            clock: Window at the end of each step, shape (steps, N_CLOCK).
+            clock: Window at the end of each step, shape (steps, N_CLOCK); loads of rails follow where the ground moves.
             irregularity: Track channels at the wheelsets, shape (B, steps, W, N_IRREGULARITY or N_SHAPED).
             wheel_record: Wheel output of every step, shape (B, steps, W, 2, N_WHEEL_RECORD).
             body_record: Displacement, velocity, acceleration of the bodies, shape (B, rows, 3, 5 bodies).
             slab_record: Displacement, velocity, acceleration of every slab coordinate where the bodies are recorded,
                 vectors, shape (B rows groups N 3, 8).
             bed: Bed, read if MORTAR_MODE is not 0.
-            loads: Loads of the cars.
+            loads: Loads of cars and slabs.
+            slab_inertia: Inertia force of a slab's coordinates by unit acceleration of the ground, shape (N,), where it
+                moves in time.
         """
         cars = state.cars
         size = np.zeros(at.N_SIZE, dtype=np.int32)
@@ -156,6 +159,10 @@ class SplineStep:
         size[at.GROUPS] = -(-int(dims[layout.SLOTS]) // 8)
         size[at.CARS], size[at.CAR_DOFS], size[at.ELEMENTS] = len(cars.car), cars.dofs, len(suspension.kind)
         size[at.LOAD_STEP], size[at.LOAD_TRAIN] = loads.step // 8, loads.train // 8
+        size[at.LOAD_GROUND] = loads.ground // 8
+        moving = slab_inertia is not None
+        slab_rows = np.zeros((4, slabs.dofs))  # the last is read where the ground moves
+        slab_rows[3] = slab_inertia if slab_inertia is not None else 0.0
         car_load = loads.array.reshape(-1, 8)
         self.state, self.size = state, size
         self.job = np.zeros(at.N_JOB, dtype=np.int32)
@@ -176,14 +183,14 @@ class SplineStep:
             irregularity, cars.wheelset_compliance, rails.coupling, contact.contact, contact.force,
             contact.wheelset_force, contact.rail_force, contact.iterations, wheel_record,
             body_record, bed.index, bed.shape, bed.weight, bed.factor, bed.rest, bed.lateral_K, bed.lateral_C,
-            bed.numbers, np.zeros((3, slabs.dofs)), bed.pressure,
+            bed.numbers, slab_rows, bed.pressure,
         )  # fmt: skip
         vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, slab_record,
                    state.car, cars.columns, car_load)  # fmt: skip
         shaped = int(irregularity.shape[-1] > layout.N_IRREGULARITY)
         self.launch = VectorLaunch(
             step_kernel,
-            (state.lanes, slabs.half_width, cars.blocks, contact.patches, shaped, contact.own),
+            (state.lanes, slabs.half_width, cars.blocks, contact.patches, shaped, int(moving), contact.own),
             arrays,
             frozenset(i for i, array in enumerate(arrays) if any(array is vector for vector in vectors)),
         )

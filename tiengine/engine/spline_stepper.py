@@ -11,12 +11,14 @@ from tiengine.engine.bed_pressure import fill_pressures
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.load_rows import LoadRows
 from tiengine.engine.lookout import Lookout
+from tiengine.engine.moving_ground import MovingGround
 from tiengine.engine.spline_state import SplineState
 from tiengine.engine.spline_step import SplineStep, Suspension
 from tiengine.engine.stepper import Plan, Rows, Stage, Stepper
 from tiengine.kernels import layout as at
 from tiengine.model.spline_model import SplineModel
-from tiengine.parameters.arrays import Flags
+from tiengine.parameters.arrays import Flags, Reals
+from tiengine.vehicle.given_loads import GivenLoads
 
 __all__ = ["SplineStepper"]
 
@@ -35,6 +37,7 @@ class SplineStepper(Stepper):
     Attributes:
         model: Constant data.
         launch: The step, bound to the arrays of state and chunk.
+        ground: Forces on rails and slabs where the ground moves in time, else None.
     """
 
     state: SplineState
@@ -53,13 +56,16 @@ class SplineStepper(Stepper):
         self._slab_record = aligned_zeros((state.trains * rows, 8))
         cars = tables.cars
         width = 8 * cars.blocks * len(cars.car)
-        self.loads = LoadRows(model.ingredients, model.vehicle_load, cars.load_place, width, 8, len(chunk.clock))
+        moving = model.ingredients.moving_ground
+        self.ground = None if moving is None else MovingGround(moving.record, model.ingredients)
+        slots = 8 * state.held.groups if self.ground else 0
+        self.loads = LoadRows(model.ingredients, model.vehicle_load, cars.load_place, width, 8, len(chunk.clock), slots)
         self.launch = SplineStep(
             state.held, model.dims, model.constants, model.ingredients.passes, tables.rails, tables.spans,
             tables.seats, tables.slabs,
             Suspension(train.element_row, train.element_kind, train.element_linear, train.element_table),
             state.wheels, chunk.clock, chunk.irregularity, chunk.wheel, chunk.body,
-            self._slab_record, state.bed, self.loads,
+            self._slab_record, state.bed, self.loads, None if self.ground is None else self.ground.slab_inertia,
         )  # fmt: skip
         self._compiled = self.launch.launch.compile_seconds
         self.factored_speed = float("nan")
@@ -70,6 +76,18 @@ class SplineStepper(Stepper):
         self._stays_end = np.zeros(0, dtype=np.bool_)
         self._explicit_bed = int(model.dims[at.MORTAR_MODE]) > 0
         self.bind()
+
+    def load(
+        self, X: Reals, V: Reals, V_rate: Reals, irregularity: Reals, given: GivenLoads | None = None,
+        time: Reals | None = None,
+    ) -> None:  # fmt: skip
+        """See :meth:`Stepper.load`; where the ground moves, rails and slabs are loaded as well."""
+        super().load(X, V, V_rate, irregularity, given, time)
+        if self.ground is not None:
+            assert time is not None
+            clock = self.chunk.clock[: len(X)]
+            clock[:, at.N_CLOCK :] = self.ground.on_rails(time, X)
+            self.loads.move_ground(self.ground.under_slabs(time, clock[:, at.FIRST_SLAB]))
 
     def seat_extremes_due(self, plan: Plan) -> Flags:
         """Steps after which the seats move on, and the last of a chunk: launches keep the extremes until then."""
@@ -174,9 +192,11 @@ class SplineStepper(Stepper):
         self.chunk.filled = body_rows
         held, slots = self.state.held, self.state.slots
         shape = (held.trains, -1, held.groups, held.slab_dofs, 3, 8)
-        recorded = self._slab_record.reshape(shape)[:, :body_rows].transpose(0, 1, 4, 2, 5, 3)
-        by_slot = recorded.reshape(held.trains, body_rows, 3, 8 * held.groups, held.slab_dofs)
-        self.chunk.slab[:, :body_rows] = by_slot[..., :slots, :]
+        recorded = self._slab_record.reshape(shape)[:, :body_rows].transpose(0, 1, 2, 4, 5, 3)
+        for group in range(held.groups):  # without a copy of the record in between
+            first = 8 * group
+            lanes = min(slots - first, 8)
+            self.chunk.slab[:, :body_rows, :, first : first + lanes] = recorded[:, :, group, :, :lanes]
         if not self._explicit_bed:  # else they are known from the forces
             fill_pressures(self.model, self.chunk)
 

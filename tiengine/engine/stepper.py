@@ -166,7 +166,10 @@ class Stepper(ABC):
         """
         self._mark = mark
 
-    def load(self, X: Reals, V: Reals, V_rate: Reals, irregularity: Reals, given: GivenLoads | None = None) -> None:
+    def load(
+        self, X: Reals, V: Reals, V_rate: Reals, irregularity: Reals, given: GivenLoads | None = None,
+        time: Reals | None = None,
+    ) -> None:  # fmt: skip
         """Fill the chunk for the coming steps.
 
         Args:
@@ -175,9 +178,10 @@ class Stepper(ABC):
             V_rate: Its rate [m/s^2].
             irregularity: Track channels, shape (B, steps, W, channels).
             given: Loads of the train beyond gravity; None where it has none.
+            time: Ends of the steps since the start of the run [s], needed where the ground moves.
         """
         clock = window_clock(self.ingredients.slab, X, V, V_rate, self.ingredients.seat_reach)
-        self.chunk.clock[: len(X)] = clock
+        self.chunk.clock[: len(X), : at.N_CLOCK] = clock
         self.chunk.irregularity[:, : len(X)] = irregularity
         if given is not None:
             self.loads.fill(given, len(X))

@@ -10,6 +10,7 @@ from tiengine.engine.chunk import Chunk
 from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.stability import of_trains, step_growth, with_stiffest_seats
 from tiengine.engine.vector_mode import lanes_for
+from tiengine.irregularity.base_motion import GroundRecord, check_record
 from tiengine.irregularity.irregularity import IrregularityParams
 from tiengine.irregularity.rail_shapes import RailShapes
 from tiengine.irregularity.track_checks import check_step, check_wave, shortest_wavelength
@@ -61,6 +62,8 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
     shortest = shortest_wavelength(scenario.irregularity)
     round_tables = _wheel_tables(scenario)
     waves = _waves_of_shapes(scenario, round_tables)
+    moving = scenario.track.base_motion
+    record = None if moving.file is None else GroundRecord(moving)
     jit, reason = 0.0, ""
     for dt in AUTO_STEPS if wanted == "auto" else (float(wanted),):
         try:
@@ -68,6 +71,8 @@ def prepare(scenario: Scenario, public_launch: bool = False, trains: int = 1) ->
             check_step(scenario.irregularity, shortest, fastest, dt)
             for name, wavelength in waves:
                 check_wave(name, wavelength, fastest, dt)
+            if record is not None:
+                check_record(record, fastest, dt)
         except InputError:
             if wanted == "auto" and dt != AUTO_STEPS[-1]:
                 continue

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,8 +14,11 @@ from tiengine.figures.one_train import of_one_train
 from tiengine.figures.palette import BLACK, ORANGE, PURPLE
 from tiengine.figures.style import LEFT, RIGHT, Look, new_figure
 from tiengine.indices.extremes import Extremes, read_extremes
+from tiengine.indices.ground_under import ground_profile, rail_profile
 from tiengine.indices.train_record import AbsentError, Train
+from tiengine.parameters.arrays import Reals
 from tiengine.parameters.conventions import SIDES
+from tiengine.parameters.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,22 +44,24 @@ def draw(train: Train) -> Figure:
     if not seats.reached.any():
         raise AbsentError(f"{train.result.name}: the train reached no seat: there are no envelopes to draw")
     enlarged = [(extremes, draw) for extremes, draw in ((seats, draw_seats), (slabs, draw_slabs)) if extremes.defects]
-    figure = new_figure(
-        20.0 if enlarged else 15.0, f"{train.caption}: extremes of every seat and slab over the whole run"
-    )
+    shapes = list(_shapes(train))
+    height = (20.0 if enlarged else 15.0) + 3.5 * len(shapes)
+    figure = new_figure(height, f"{train.caption}: extremes of every seat and slab over the whole run")
     below: Figure | SubFigure = figure
     if enlarged:
         above, below = figure.subfigures(2, 1, height_ratios=(1.0, 2.4), squeeze=False)[:, 0]
         _enlarge(above, enlarged)
-    axes = below.subplots(4, 1, sharex=True)
+    axes = below.subplots(4 + len(shapes), 1, sharex=True)
     _vertical(axes[0], seats)
     _lateral(axes[1], seats)
     _pressure(axes[2], slabs)
     _moments(axes[3], slabs)
+    for panel, draw_shape in zip(axes[4:], shapes, strict=True):
+        draw_shape(panel)
     for panel in axes:
         _mark(panel, seats, slabs)
         panel.margins(x=0.0)
-    axes[3].set_xlabel("chainage [m]")
+    axes[-1].set_xlabel("chainage [m]")
     handles = dict(zip(*reversed(axes[0].get_legend_handles_labels()), strict=True))
     below.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3 if len(handles) > 5 else 5)
     return figure
@@ -108,6 +114,48 @@ def _moments(axes: Axes, slabs: Extremes) -> None:
         _line(axes, slabs, slabs[f"smallest_moment_{direction}"], dashed, 1e-3, drawstyle="steps-mid")
     title = "Slabs: largest bending moment; dashed: smallest; grey: along the track, black: across"
     axes.set(ylabel="[kN m/m]", title=title)
+
+
+def _shapes(train: Train) -> Iterator[Callable[[Axes], None]]:
+    """Functions that draw shapes of rails and displaced ground, where there are such and their files still exist."""
+    for profile in (_rails, _ground):
+        with suppress(AbsentError, InputError):
+            yield profile(train)
+
+
+def _rails(train: Train) -> Callable[[Axes], None]:
+    x, heights = rail_profile(train)
+
+    def draw_rails(axes: Axes) -> None:
+        for side, look in enumerate(LOOKS):
+            _shape(axes, x, heights[:, side], look)
+        axes.set(ylabel="[mm]", title="Rails: shapes of their running surfaces, down positive")
+
+    return draw_rails
+
+
+def _ground(train: Train) -> Callable[[Axes], None]:
+    x, displacement = ground_profile(train)
+
+    def draw_ground(axes: Axes) -> None:
+        down, aside = displacement.T
+        if down.any():
+            axes.fill_between(x, 1e3 * down, 1e3 * max(down.max(), 0.0), color="0.85", linewidth=0.0)
+            _shape(axes, x, down, Look(BLACK, "-"))
+        if aside.any():
+            _shape(axes, x, aside, Look(BLACK, "--"))
+        axes.set(ylabel="[mm]", title="Ground: displacement, down positive; dashed: to the right")
+
+    return draw_ground
+
+
+def _shape(axes: Axes, x: Reals, values: Reals, look: Look) -> None:
+    """Draw a shape along the track, down positive, on an axis that points down."""
+    curve = Curve(float(x[0]), float(x[-1]))
+    curve.add(x, 1e3 * values)
+    axes.plot(*curve.line, rasterized=curve.is_thinned, **look._asdict())
+    if not axes.yaxis_inverted():
+        axes.invert_yaxis()
 
 
 def _mark(axes: Axes, seats: Extremes, slabs: Extremes) -> None:

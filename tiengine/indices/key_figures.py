@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from tiengine.indices.extremes import Extremes, read_extremes
+from tiengine.indices.ground_under import ground_motion, ground_profile
 from tiengine.indices.revolutions import revolutions, shaped_wheels
 from tiengine.indices.train_record import AbsentError, Train
 from tiengine.indices.wheel_extremes import ForceExtreme, WheelExtremes, wheel_extremes
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.conventions import SIDES
+from tiengine.parameters.errors import InputError
 
 __all__ = ["KeyFigure", "Summary", "key_figures", "summarise"]
 
@@ -61,10 +63,10 @@ def key_figures(train: Train) -> list[KeyFigure]:
         train: The train.
     """
     found: list[KeyFigure] = []
-    for part in (_wheels, _revolutions, _seats, _slabs):
+    for part in (_wheels, _revolutions, _seats, _slabs, _displaced_ground, _moving_ground):
         try:
             found += part(train)
-        except AbsentError:
+        except (AbsentError, InputError):  # a file that the scenario names may be gone
             continue
     return found
 
@@ -142,6 +144,26 @@ def _slabs(train: Train) -> Iterator[KeyFigure]:
     for channel, name, scale, unit in rows:
         value, where = _at_largest(slabs, slabs[channel], "slab")
         yield KeyFigure(name, scale * value, unit, where)
+
+
+def _displaced_ground(train: Train) -> Iterator[KeyFigure]:
+    """Largest displacement of the ground that the train passed over."""
+    profile = ground_profile(train)
+    for direction, words in enumerate(("vertical", "lateral")):
+        size = np.abs(profile.displacement[:, direction])
+        if size.any():
+            where = f"chainage {profile.x[int(np.argmax(size))]:.1f} m"
+            yield KeyFigure(f"largest {words} displacement of the ground", 1e3 * float(size.max()), "mm", where)
+
+
+def _moving_ground(train: Train) -> Iterator[KeyFigure]:
+    """Largest acceleration of the ground."""
+    motion = ground_motion(train)
+    for direction, words in enumerate(("vertical", "lateral")):
+        if motion.acceleration[direction] > 0.0:
+            yield KeyFigure(
+                f"largest {words} acceleration of the ground", float(motion.acceleration[direction]), "m/s^2"
+            )
 
 
 def _at_largest(extremes: Extremes, values: Reals, kind: str) -> tuple[float, str]:

@@ -107,7 +107,7 @@ def _series(ground: Ground) -> MeasuredTrack:
     assert ground.file is not None
     try:
         changed = Path(ground.file).stat().st_mtime_ns
-    except OSError:
+    except (OSError, ValueError):
         changed = 0  # the reader says what is wrong
     return _read(ground.file, ground.taper, changed)
 

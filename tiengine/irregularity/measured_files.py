@@ -44,6 +44,7 @@ __all__ = ["LEVEL_BASE", "MeasuredSeries", "read_series"]
 LEVEL_BASE = 1.5
 """Distance over which a cross level is a height [m]: 2 b_i."""
 LARGEST_GAP = 3.0  # times the median step
+STEEPEST = 0.1  # m of height or position within a metre; worn joints and switches reach 0.02
 LARGEST_DEVIATION = 0.5  # m: a larger value is the gauge itself, not its deviation
 LARGEST_CHAINAGE = 1e7  # m
 LARGEST_HEIGHT = 1e4  # m or rad; absolute levels are allowed, since a band-pass removes them
@@ -126,6 +127,7 @@ def read_series(
     _check_gauge(text, by_name.get("gauge"), numbers)
     for name in {"z_v", "vertical_left", "vertical_right"} & set(names) if vertical_up else ():
         by_name[name] = -by_name[name]
+    _check_steepness(text, by_name, numbers)
     channels = [_channel(by_name, sources, text, text.lines[max(first - 1, 0)][0]) for sources in _SOURCES]
     series = _along_the_run(np.stack([by_name["x"], *channels], axis=1), start, reverse)
     words = f"read as {text.description}; {len(found)} of {width} columns used"
@@ -238,6 +240,20 @@ def _check_size(text: TrackText, names: Sequence[str], rows: Reals, numbers: Seq
         i, j = large[0]
         rule = f"{names[j]} = {rows[i, j]:g}: must be at most {most[j]:g} in magnitude: are its units right?"
         raise text.error(numbers[i], rule)
+
+
+def _check_steepness(text: TrackText, columns: dict[str, Reals], numbers: Sequence[int]) -> None:
+    """Refuse heights and positions that change within a metre as no track does."""
+    x = columns["x"]
+    rising = np.abs(x - x[0])
+    ahead = np.minimum(np.searchsorted(rising, rising + 1.0), len(x) - 1)
+    for name, values in columns.items():
+        change = np.abs(values[ahead] - values) * (name not in ("x", "theta"))
+        i = int(np.argmax(change))
+        if change[i] > STEEPEST:
+            line = numbers[min(i, len(numbers) - 1)]
+            rule = f"changes by {change[i]:.3g} m within 1 m; at most {STEEPEST:g} m expected: are its units right?"
+            raise text.error(line, f"{name} {rule}")
 
 
 def _channel(columns: dict[str, Reals], sources: Sequence[str], text: TrackText, number: int) -> Reals:

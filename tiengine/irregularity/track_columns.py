@@ -121,7 +121,7 @@ def _head_line(text: TrackText, wanted: dict[str, str | int]) -> int:
 
 def _unit_row(cells: list[str], count: int) -> list[str] | None:
     """Units of a line that holds nothing else."""
-    units = [cell.strip("[]() ") for cell in cells]
+    units = [cell.strip("[]() ").lower() for cell in cells[:count]]
     only_units = len(units) == count and any(units) and all(u in (*_UNITS, "", "-") or "/" in u for u in units)
     return ["" if u not in _UNITS else u for u in units] if only_units else None
 
@@ -165,7 +165,7 @@ def _named(text: TrackText, number: int, cells: list[str]) -> list[tuple[str, in
 def _factor(text: TrackText, number: int, name: str, cell: str, below: str, unit: str) -> float:
     """Factor of a column to SI units: the unit of its head, that of the line below, the default."""
     match = _HEAD_UNIT.fullmatch(cell)
-    stated = (match[2] if match else None) or below or None
+    stated = ((match[2] if match else None) or below or "").lower() or None
     allowed = _ALLOWED.get(name, _LENGTHS)
     if stated is not None and stated not in allowed:
         raise text.error(number, f"column {cell!r}: its unit must be {' or '.join(allowed)}")

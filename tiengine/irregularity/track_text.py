@@ -28,7 +28,7 @@ MISSING = {"", "-", "--", "*", "na", "n/a", "nan", "null", "none"}
 MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 NATIONAL = re.compile(rb"(?:[\xa1-\xf7][\xa1-\xfe])+")
 """Characters of GB 2312, the part of GBK that texts use."""
-MILEAGE = re.compile(r"([A-Za-z]{0,4})(\d{1,5})\+(\d{1,4}(?:[.,]\d+)?)")
+MILEAGE = re.compile(r"([A-Za-z]{0,4})[ ]*(\d{1,5})[ ]*\+[ ]*(\d{1,4}(?:[.,]\d+)?)")
 """Kilometre and metre as surveyors write them: K120+003.250."""
 HEAD = re.compile(r"\S+(?:[ ]*[\[(][^\])]*[\])])?")
 """A column's head among heads separated by blanks, with its unit."""
@@ -72,8 +72,13 @@ class TrackText:
         return _split(line, self.separator)
 
     def heads(self, line: str) -> list[str]:
-        """Split a line of heads, which may hold blanks before a unit."""
-        return HEAD.findall(line) if self.separator == " " else self.cells(line)
+        """Split a line of heads, which may hold blanks before a unit; separators at its end head nothing."""
+        if self.separator == " ":
+            return HEAD.findall(line)
+        cells = self.cells(line)
+        while cells and not cells[-1]:
+            cells.pop()
+        return cells
 
     def number(self, cell: str, mileage: bool = False) -> float | None:
         """Number of a cell: NaN where it holds no value, None where it is not a finite number.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
@@ -89,6 +88,8 @@ def band_passed(series: Reals, shortest: float, longest: float) -> Reals:
     resampled = _even(series, step)
     even, values = resampled[:, 0], resampled[:, 1:]
     n = len(even)
+    from scipy.signal import butter, sosfiltfilt  # takes half a second, and few runs filter a measured track
+
     sections = butter(
         FILTER_ORDER, [1.0 / longest, 1.0 / shortest], "bandpass", fs=(n - 1) / (x[-1] - x[0]), output="sos"
     )

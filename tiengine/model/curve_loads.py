@@ -21,15 +21,12 @@ Gravity along the track goes to the wheels as the inertia of a growing speed doe
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
-import scipy.sparse as sp
 
+from tiengine.model.frame_loads import FrameLoads
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.conventions import GRAVITY
 from tiengine.track.alignment import Alignment
-from tiengine.vehicle.given_loads import GivenLoads
 from tiengine.vehicle.train import TrainModel
 
 __all__ = ["CurveLoads", "frame_offsets"]
@@ -37,64 +34,25 @@ __all__ = ["CurveLoads", "frame_offsets"]
 Y, Z, ROLL, PITCH, YAW = range(5)
 
 
-class CurveLoads:
-    """Given loads of a train on an alignment; the same for all trains that are advanced together.
+class CurveLoads(FrameLoads):
+    """Given loads of a train on an alignment.
 
     Attributes:
         alignment: The line.
-        train: The train.
-        sets: 1.
     """
-
-    sets = 1
 
     def __init__(self, alignment: Alignment, train: TrainModel) -> None:
         """Keep both."""
-        self.alignment, self.train = alignment, train
+        super().__init__(train)
+        self.alignment = alignment
 
-    @cached_property
-    def _matrices(self) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array, sp.csr_array]:
-        """K, C, C_speed of the train; elongations of its elements by its coordinates."""
-        train = self.train
-        count, width = train.element_index.shape
-        entries = train.element_row.ravel(), (np.repeat(np.arange(count), width), train.element_index.ravel())
-        rows = sp.csr_array(sp.coo_array(entries, shape=(count, train.n)))
-        return sp.csr_array(train.K), sp.csr_array(train.C), sp.csr_array(train.C_speed), rows
+    def along_track(self, x: Reals) -> Reals:
+        """Forces of gravity along the track, g sin(gradient) at every body."""
+        grade = GRAVITY * np.sin(np.arctan(self.alignment.lines[2](x[:, None] + self.train.body_x)))
+        return np.asarray(grade @ self.train.grade_force.T, np.float64)
 
-    def __call__(self, time: Reals, x: Reals, V: Reals, V_rate: Reals) -> GivenLoads:
-        """Loads at a number of moments, see :class:`tiengine.vehicle.given_loads.LoadSource`."""
-        train, V, V_rate = self.train, V[:, None], V_rate[:, None]
-        K, C, C_speed, rows = self._matrices
-        offset, rate = (self._padded(motion) for motion in frame_offsets(self.alignment, train, x, V))
-        force = self._padded(self._inertia(x, V, V_rate))
-        force += self._grade(x) @ train.grade_force.T
-        turning = self._frame_rates(x, V)
-        spinning = np.zeros_like(force)
-        spinning[:, train.wheelset_dof[:, 4]], spinning[:, train.wheelset_dof[:, 2]] = turning
-        force -= (K @ offset.T).T + (C @ rate.T).T + V * (C_speed @ spinning.T).T
-        by_rate = train.element_kind == 0
-        elongation = np.where(by_rate, (rows @ rate.T).T, (rows @ offset.T).T)
-        self._between_cars(elongation, x, V)
-        return GivenLoads(force[None], elongation[None], np.stack(turning, axis=2)[None])
-
-    def _between_cars(self, elongation: Reals, x: Reals, V: Reals) -> None:
-        """Elongations of elements between two vehicles, whose frames lie against that of the first of them."""
-        train, rows = self.train, self._matrices[3]
-        vehicle_x = np.repeat(train.body_vehicle_x, 5)
-        for e in np.flatnonzero(train.element_between_cars):
-            reference = float(vehicle_x[train.element_index[e, 0]])
-            motions = frame_offsets(self.alignment, train, x, V, reference)
-            motion = self._padded(motions[0 if train.element_kind[e] else 1])
-            elongation[:, e] = (rows[[e]] @ motion.T)[0]
-
-    def _padded(self, bodies: Reals) -> Reals:
-        """Coordinates of the train from those of the bodies, shape (steps, bodies, 5); internal states are zero."""
-        out = np.zeros((len(bodies), self.train.n))
-        out[:, : self.train.n_dof] = bodies.reshape(len(bodies), -1)
-        return out
-
-    def _inertia(self, x: Reals, V: Reals, V_rate: Reals) -> Reals:
-        """Inertia forces of the moving frame and gravity's change on every body, shape (steps, bodies, 5)."""
+    def inertia(self, time: Reals, x: Reals, V: Reals, V_rate: Reals) -> Reals:
+        """Inertia forces of the moving frame and gravity's change, see :class:`FrameLoads`."""
         train, (kappa, phi, grade) = self.train, self.alignment.lines
         at = x[:, None] + train.body_x
         mass = np.diag(train.M)[: train.n_dof : 5]
@@ -110,12 +68,12 @@ class CurveLoads:
         f[..., YAW] = -Jz * (V**2 * kappa(at, 1) + V_rate * kappa(at))
         return f
 
-    def _grade(self, x: Reals) -> Reals:
-        """Gravity along the track at every body per unit mass, g sin(gradient) [m/s^2], shape (steps, bodies)."""
-        return np.asarray(GRAVITY * np.sin(np.arctan(self.alignment.lines[2](x[:, None] + self.train.body_x))))
+    def offsets(self, time: Reals, x: Reals, V: Reals, reference: float | None = None) -> tuple[Reals, Reals]:
+        """See :class:`FrameLoads`."""
+        return frame_offsets(self.alignment, self.train, x, V, reference)
 
-    def _frame_rates(self, x: Reals, V: Reals) -> tuple[Reals, Reals]:
-        """Yaw and roll rate of the frame at every wheelset [rad/s], shape (steps, W) each."""
+    def frame_rates(self, time: Reals, x: Reals, V: Reals) -> tuple[Reals, Reals]:
+        """See :class:`FrameLoads`."""
         kappa, phi, _ = self.alignment.lines
         at = x[:, None] + self.train.wheelset_x
         return V * kappa(at), V * phi(at, 1)

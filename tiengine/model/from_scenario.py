@@ -42,7 +42,8 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         effort=asked.effort,
         couplings=parts.couplings,
     )
-    if scenario.track.line is not None or scenario.wind.speed is not None or asked.forces:
+    moving = scenario.track.base_motion.file is not None
+    if scenario.track.line is not None or scenario.wind.speed is not None or asked.forces or moving:
         train = replace(train, K=train.K + train.K_leaning)
     contacts = _contacts(scenario, train)
     train = with_wheel_radii(train, np.array(parts.wheel_radii))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from tiengine.irregularity.base_motion import GroundRecord
+from tiengine.model.base_motion_loads import BaseMotionLoads
 from tiengine.model.curve_loads import CurveLoads
 from tiengine.scenario.scenario import Scenario
 from tiengine.vehicle.force_history import ForceLoads
@@ -13,7 +15,7 @@ __all__ = ["given_sources"]
 
 
 def given_sources(scenario: Scenario, train: TrainModel) -> tuple[LoadSource, ...]:
-    """Sources of given loads: a line that is not straight and level, wind, forces; their files are read.
+    """Sources of given loads: a line that is not straight and level, moving ground, wind, forces; files are read.
 
     Args:
         scenario: Checked scenario.
@@ -28,6 +30,8 @@ def given_sources(scenario: Scenario, train: TrainModel) -> tuple[LoadSource, ..
     ]
     line = scenario.track.line
     found: list[LoadSource] = [] if line is None else [CurveLoads(line, train)]
+    if scenario.track.base_motion.file is not None:
+        found.append(BaseMotionLoads(GroundRecord(scenario.track.base_motion), train))
     if parts.aerodynamics is not None:
         found.append(WindLoads(scenario.wind, parts.aerodynamics, train, _windy_cars(scenario)))
     if forces:

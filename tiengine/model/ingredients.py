@@ -13,6 +13,7 @@ from tiengine.contact.table import ContactTable
 from tiengine.contact.wheel_contacts import WheelContacts
 from tiengine.irregularity.wheel_shapes import WheelTables
 from tiengine.kernels import layout as at
+from tiengine.model.base_motion_loads import BaseMotionLoads
 from tiengine.model.newmark import Newmark
 from tiengine.parameters.arrays import Reals
 from tiengine.track.fastening import Fastening, seat_count
@@ -109,6 +110,16 @@ class Ingredients:
     def given_loads(self, time: Reals, x: Reals, V: Reals, V_rate: Reals) -> GivenLoads | None:
         """Sum of the given loads, None if there are none; arguments as in :class:`LoadSource`."""
         return sum_of_loads(self.given, self.train, time, x, V, V_rate) if self.given else None
+
+    @property
+    def moving_ground(self) -> BaseMotionLoads | None:
+        """Motion of the ground in time, None if it is at rest."""
+        return next((source for source in self.given if isinstance(source, BaseMotionLoads)), None)
+
+    @property
+    def rail_loads(self) -> int:
+        """Given loads of a rail in a step: on w and v of its trial functions where the ground moves, else none."""
+        return 0 if self.moving_ground is None else 2 * self.functions.count
 
     @property
     def contact_values(self) -> Reals:

@@ -65,7 +65,7 @@ class Loop:
         real_time_factor_per_train: The same over the number of trains.
         steps_per_s: Steps of all trains together per second, without timers.
         us_per_train_step: Mean with timers, the sum of all stages.
-        step_us_p50: Median of whole steps of all trains together, with timers.
+        step_us_p50: Median of the steps that are taken at once (of splines a launch), all trains together, with timers.
         step_us_p90: Their 90th percentile.
         step_us_p99: Their 99th percentile.
         step_us_max: Their maximum.
@@ -216,8 +216,8 @@ def compare(first: ProfileReport, second: ProfileReport) -> Comparison:
     ]
     for words, key in (
         ("whole loop [us/train-step]", "us_per_train_step"),
-        ("step, median [us]", "step_us_p50"),
-        ("step, 99 % [us]", "step_us_p99"),
+        ("steps at once, median [us]", "step_us_p50"),
+        ("steps at once, 99 % [us]", "step_us_p99"),
         ("RTF", "real_time_factor"),
         ("RTF per train", "real_time_factor_per_train"),
     ):

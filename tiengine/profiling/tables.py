@@ -63,7 +63,7 @@ def _facts(report: ProfileReport) -> Iterator[tuple[str, str]]:
     yield "real-time factor", f"{loop.real_time_factor:.3f} ({loop.real_time_factor_per_train:.3f} per train)"
     yield "steps per second", f"{loop.steps_per_s:.0f}"
     percentiles = (loop.step_us_p50, loop.step_us_p90, loop.step_us_p99, loop.step_us_max)
-    yield "step, p50 p90 p99 max", f"{' '.join(f'{x:.1f}' for x in percentiles)} us"
+    yield "steps at once, p50 p90 p99 max", f"{' '.join(f'{x:.1f}' for x in percentiles)} us"
     yield (
         "overhead of measuring",
         f"{100.0 * loop.measuring_overhead:+.1f} % (timers in the step, against none, in turn)",

@@ -48,7 +48,7 @@ class Times:
         calls: Calls of each stage in a step, by its displayed name.
         stages: Time of each stage over the timed steps.
         chunks: Time of the work that is done once a chunk, over all steps.
-        timed: Time of each step with stage timers.
+        timed: Time of the steps that are taken at once, with stage timers.
         blocks: Mean time of a step in a block with stage timers and in its neighbour without.
         timed_ns: Time of all blocks with stage timers.
         plain_ns: Time of all blocks without.

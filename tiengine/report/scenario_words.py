@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["scenario_words"]
 
+GROUND = {"cosine": "a cosine", "angles": "two ramps that meet", "ramp": "a ramp"}
+
 
 def scenario_words(scenario: Scenario) -> list[tuple[str, str]]:
     """Describe a scenario.
@@ -36,6 +38,8 @@ def scenario_words(scenario: Scenario) -> list[tuple[str, str]]:
         ("Defects", "; ".join(_defects(scenario)) or "none"),
         ("Numerics", _numerics(scenario)),
     ]
+    if ground := "; ".join(_ground(scenario)):
+        rows.insert(3, ("Ground", ground))
     if scenario.ensemble != Ensemble():
         rows.insert(0, ("Trains", _ensemble(scenario)))
     if scenario.source:
@@ -110,6 +114,22 @@ def _defects(scenario: Scenario) -> Iterator[str]:
         yield _fastenings(row, slab.fastening_pitch)
     for void in scenario.track.mortar_voids:
         yield _void(void)
+
+
+def _ground(scenario: Scenario) -> Iterator[str]:
+    """Displacements of the ground, then its motion in time."""
+    for each in scenario.track.ground:
+        if each.file is not None:
+            yield f"displaced by {Path(each.file).name}" + (f", times {each.scale:g}" if each.scale != 1.0 else "")
+            continue
+        sizes = (("down", "up", each.depth), ("to the right", "to the left", each.lateral))
+        moved = [f"{1e3 * abs(size):g} mm {plus if size > 0.0 else minus}" for plus, minus, size in sizes if size]
+        yield f"displaced {' and '.join(moved)}, {GROUND[each.kind]} over {each.length:g} m at chainage {each.at:g} m"
+    moving = scenario.track.base_motion
+    if moving.file is not None:
+        scale = f", times {moving.scale:g}" if moving.scale != 1.0 else ""
+        speed = "everywhere at once" if moving.wave_speed is None else f"travelling at {moving.wave_speed:g} m/s"
+        yield f"moving in time by {Path(moving.file).name}{scale}, {speed}, from {moving.start:g} s on"
 
 
 def _fastenings(row: FailedFastenings, pitch: float) -> str:

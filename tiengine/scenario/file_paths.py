@@ -16,6 +16,7 @@ FILES = (
     ("irregularity",),
     ("track", "rail_shapes"),
     ("track", "ground"),
+    ("track", "base_motion"),
     ("train", "wheel_shapes"),
     ("train", "forces"),
 )

@@ -41,11 +41,12 @@ class ProfilePoints(Params):
     allow_kinks: Annotated[
         bool, Field(description="accept kinks of a file's surface where wheel and rail can touch")
     ] = False
+    rail_axis: Annotated[float | None, Q("m", "y of the points at an upright rail's axis", ge=-0.2, le=0.2)] = None
 
     @property
     def placement(self) -> Placement:
         """Statements about the points."""
-        return Placement(self.has_cant, self.smoothing, self.mirror, self.tape_circle, self.allow_kinks)
+        return Placement(self.has_cant, self.smoothing, self.mirror, self.tape_circle, self.allow_kinks, self.rail_axis)
 
 
 def profile_table(path: Path, kind: Kind, where: str, stated: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Checks of the shapes of rails and wheels against a run."""
+"""Checks of the shapes of rails, wheels and ground against a run."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ def check_shapes(
     for key, given in (
         ("track.rail_shapes", track.rail_shapes),
         ("track.ground", track.ground),
+        ("track.base_motion", track.base_motion.file),
         ("train.wheel_shapes", train.wheel_shapes),
     ):
         if given and numerics.trial_functions == "sines":

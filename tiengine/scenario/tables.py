@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from tiengine.irregularity.base_motion import BaseMotion
 from tiengine.irregularity.ground import Ground
 from tiengine.irregularity.rail_shapes import RailShape
 from tiengine.irregularity.wheel_shapes import WheelShape
@@ -155,6 +156,7 @@ class Track(Params):
         tuple[MortarVoid, ...], Field(description="tables, see below", max_length=MOST_DEFECTS)
     ] = ()
     rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
+    base_motion: Annotated[BaseMotion, Field(description="table, see below")] = BaseMotion()
     ground: Annotated[tuple[Ground, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
 
     @property

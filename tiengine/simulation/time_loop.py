@@ -26,6 +26,7 @@ from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.irregularity.rail_shapes import RailShapes, SettledRail
 from tiengine.irregularity.shaped_channels import ShapedChannels
 from tiengine.irregularity.track_checks import check_reach
+from tiengine.kernels import layout as at
 from tiengine.model.constant_data import Model
 from tiengine.recording.guards import Guard
 from tiengine.recording.recorder import Recorder
@@ -182,6 +183,7 @@ class Run:
             self.timer.lap(None)
             self.stepper.finish(recorder.body_rows(done, count))
         self.timer.lap("mortar")
+        self._move_with_ground(x)
         sent = self._collect(x)
         self.done += count
         return sent
@@ -200,11 +202,22 @@ class Run:
         self.timer.lap("irregularity")
         time = ingredients.newmark.dt * np.arange(self.done + 1.0, self.done + count + 1.0)
         given = ingredients.given_loads(time, x, V, V_rate)
-        self.stepper.load(x - ingredients.centre_s, V, V_rate, irregularity, given)
+        self.stepper.load(x - ingredients.centre_s, V, V_rate, irregularity, given, time)
         self.guard.load(self.done, x)
         self.position = float(x[-1])
         self.timer.lap("window and seats")
         return x
+
+    def _move_with_ground(self, x: NDArray[np.float64]) -> None:
+        """Add the ground's motion to that of the bodies, recorded from it, at steps that end at chainages x [m]."""
+        ground, chunk = self.stepper.ingredients.moving_ground, self.stepper.chunk
+        if ground is None or not chunk.filled:
+            return
+        number = np.arange(self.done + 1, self.done + len(x) + 1)
+        taken = number % self.recorder.body_every == 0
+        V, V_rate = chunk.clock[: len(x)][taken][:, [at.SPEED, at.SPEED_RATE]].T[..., None]
+        motion = ground.motion(number[taken] * self.recorder.dt, x[taken], V, V_rate)
+        chunk.body[:, : chunk.filled] += motion.reshape(*motion.shape[:2], -1)
 
     def _collect(self, x: NDArray[np.float64]) -> Advanced:
         """Blocks and events of the steps that end at chainages x [m]; trains that failed are taken out."""

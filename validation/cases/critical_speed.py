@@ -6,9 +6,8 @@ bisected between 100 and 600 km/h; 600 means that no hunting was found, and 1000
 of one size finds one attractor; H. True, Vehicle System Dynamics 51(3) (2013) 443-459, shows what such a search can
 miss. The numbers are therefore for information, and only the trends are judged.
 
-The numerics are coarse on purpose: hunting is at 1 to 8 Hz, and its waves are 10 m and longer, so that the rails enter
-by their static compliance only: one mode per metre, a window of 2 m or more beyond the outer wheels, steps of 0.4 ms
-(a sixtieth of a radian at 8 Hz; the error is its square).
+The window is short on purpose, 26 m: hunting is at 1 to 8 Hz, and its waves are 10 m and longer, so that the rails
+enter by their static compliance only. Knots and step are those of the default.
 
 Pairs of profiles: LMA on CHN60 as used by the Chinese vehicles (tape circles 1493 mm apart), and S1002 on 60E1 with
 tape circles 1500 mm apart, for which EN 15302 gives its conicity of 0.18 at 3 mm; at 1493 mm the same pair has 0.017.

@@ -41,6 +41,8 @@ class ModalSlab:
         seat_x: Position of the seats from the slab's centre [m], shape (seats,).
         bed: w of the modes at the bed's sampling points, shape (m, points).
         bed_factor: Factor of the bed there, shape (points,).
+        bed_x: Place of the points from the slab's centre [m], shape (points,).
+        bed_area: Area of a point [m^2].
         omega: Circular frequencies of the free plate [rad/s], shape (m,).
     """
 
@@ -51,6 +53,8 @@ class ModalSlab:
     seat_x: Reals
     bed: Reals
     bed_factor: Reals
+    bed_x: Reals
+    bed_area: float
     omega: Reals
 
 
@@ -115,6 +119,8 @@ def modal_slab(
         seat_x=x,
         bed=(sampled @ phi).T,
         bed_factor=np.array([_factor(slab, voids, px, py) for px, py in points]),
+        bed_x=points[:, 0],
+        bed_area=slab.length * slab.width / len(points),
         omega=np.sqrt(omega2),
     )
 

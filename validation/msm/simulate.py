@@ -11,6 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tiengine.engine import backend
+from tiengine.irregularity.base_motion import GroundRecord
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.model.from_scenario import ingredients
 from tiengine.parameters.arrays import Reals
@@ -20,6 +21,7 @@ from tiengine.result import Result
 from tiengine.result_files.writer import Writer
 from tiengine.scenario.scenario import Scenario, load_scenario, to_toml
 from tiengine.simulation.simulate import Progress
+from validation.msm.ground import ForcedBed
 from validation.msm.model import FullTrack, build_track
 from validation.msm.start import steady_rolling
 from validation.msm.step import Buffers, FullState, FullStepper
@@ -85,6 +87,7 @@ def prepare(scenario: Scenario, numerics: FullLength, steps: int, body_rows: int
         ("wind", scenario.wind.speed is not None),
         ("train.forces", scenario.train.forces),
         ("track.rail_shapes", scenario.track.rail_shapes),
+        ("track.ground", scenario.track.ground),
         ("train.wheel_shapes", scenario.train.wheel_shapes),
     )
     for key, given_key in refused:
@@ -102,7 +105,10 @@ def prepare(scenario: Scenario, numerics: FullLength, steps: int, body_rows: int
     track = build_track(scenario, given, numerics.length, numerics.modes_per_metre, numerics.slab_modes)
     state = FullState.at_rest(track)
     steady_rolling(track, state, scenario, given, V)
-    return FullStepper(track, state, Buffers.empty(track, steps, body_rows), V)
+    stepper = FullStepper(track, state, Buffers.empty(track, steps, body_rows), V)
+    if scenario.track.base_motion.file is not None:
+        stepper.bed = ForcedBed(track, GroundRecord(scenario.track.base_motion), given.slab.pitch)
+    return stepper
 
 
 def load(stepper: FullStepper, scenario: Scenario, irregularity: Irregularity, position: float, end: float) -> Reals:
@@ -168,6 +174,7 @@ def _loop(
     while position < end - 1e-9:
         chainage = load(stepper, scenario, irregularity, position, end)
         count = len(chainage)
+        buffers.time[:count] = dt * np.arange(done + 1, done + count + 1)
         plan = recorder.plan(done, count)
         for step, body in zip(plan.step.tolist(), plan.body.tolist(), strict=True):
             stepper.step(step, body)

@@ -4,7 +4,8 @@ r"""One step of the full-length model: the engine's Newmark passes, on modes of 
 
 f contains seats, gravity, nonlinear suspension; contact is solved against the compliance at the step's end. The force
 of a seat on the rail uses the rail's and the slab's iterates, its force on the slab the rail's iterate and the slab's
-predictor, since the slab's operator contains its own side of the seat.
+predictor, since the slab's operator contains its own side of the seat. On ground that moves in time all coordinates are
+absolute, and the bed of the slabs is displaced.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from tiengine.kernels.wheel_rail import COS, N_CONTACT
 from tiengine.model.newmark import inverse
 from tiengine.parameters.arrays import Reals
 from validation.msm import kernels
+from validation.msm.ground import ForcedBed
 from validation.msm.model import CL, CV, KL, KV, FullTrack
 
 __all__ = ["Buffers", "FullState", "FullStepper"]
@@ -72,6 +74,7 @@ class Buffers:
         wheel: Wheel output of every step, shape (1, steps, W, 2, N_WHEEL_RECORD).
         body: Recorded motion of the bodies, shape (1, rows, 3, 5 bodies).
         slabs: Displacement and velocity of the slabs, recorded with the bodies, shape (rows, 2, slabs, m + 2).
+        time: End of each step since the start [s], shape (steps,); read where the ground moves.
     """
 
     clock: Reals
@@ -79,6 +82,7 @@ class Buffers:
     wheel: Reals
     body: Reals
     slabs: Reals
+    time: Reals
 
     @classmethod
     def empty(cls, track: FullTrack, steps: int, body_rows: int) -> Buffers:
@@ -90,6 +94,7 @@ class Buffers:
             wheel=np.zeros((1, steps, W, 2, at.N_WHEEL_RECORD[track.contact.patches])),
             body=np.zeros((1, body_rows, 3, 5 * bodies)),
             slabs=np.zeros((body_rows, 2, track.slabs, track.slab_modes + 2)),
+            time=np.zeros(steps),
         )
 
 
@@ -97,12 +102,14 @@ class FullStepper:
     """Stepper of a state, with kernels bound to its arrays.
 
     Attributes:
+        bed: Bed on ground that moves in time; None on ground at rest.
         seat_force: Vertical force, moment, lateral force of the seats on slabs, shape (3, 2, slabs, seats per slab).
     """
 
     def __init__(self, track: FullTrack, state: FullState, buffers: Buffers, V: float) -> None:
         """Bind the kernels, and factorise the vehicle at its constant speed V [m/s]."""
         self.track, self.state, self.buffers = track, state, buffers
+        self.bed: ForcedBed | None = None
         self._tick = np.zeros(at.N_TICK, dtype=np.int32)
         seats = track.transform.seats
         self._folded = np.zeros((6, seats))
@@ -154,6 +161,8 @@ class FullStepper:
         tick, last = self._tick, self.track.passes - 1
         tick[at.STEP] = i
         self._predict_slabs()
+        if self.bed is not None:
+            self.bed.push(self.buffers.time[i], self._linear)
         for k in range(last + 1):
             tick[at.PASS], tick[at.LAST_PASS] = k, k == last
             self._forces()
