@@ -219,15 +219,15 @@ def bed_forces(
 ):  # fmt: skip
     """Add what of one slab's bed is not in its implicit block to SLAB_LOAD, by way of a copy of its coordinates.
 
-    ``base`` is the place of the first coordinate of the slot's group, ``motion`` has rows u, v, F, shape (3, N); the
-    other arguments are those of :func:`tiengine.kernels.mortar.bed_force_and_pressure`.
+    ``base`` is the place of the first coordinate of the slot's group, ``rest`` is by slot, ``motion`` has rows u, v, F,
+    shape (3, N); the other arguments are those of :func:`tiengine.kernels.mortar.bed_force_and_pressure`.
     """
     lane = slot % 8
     for i in range(dofs):
         s = (base + i) * at.SLAB_ROWS
         motion[0, i], motion[1, i], motion[2, i] = slab[s + row_u][lane], slab[s + row_v][lane], 0.0
     pressure = mortar.bed_force_and_pressure(
-        design, index, shape, weight, factor, rest, lateral_K, lateral_C, numbers[0], numbers[1],
+        design, slot, index, shape, weight, factor, rest, lateral_K, lateral_C, numbers[0], numbers[1],
         ti.cast(numbers[2], ti.i32), ti.cast(numbers[3], ti.i32), 0, dofs, motion, 0, 1, 2,
     )  # fmt: skip
     for i in range(dofs):

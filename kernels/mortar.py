@@ -3,8 +3,10 @@
 The state is measured from rest under the slab's own weight. At a quadrature point of area dA the pressure
 beyond that of the weight is p = factor (k w + c dw/dt), positive when the slab presses down; the bed resists:
 f_i -= N_i p dA. A bed that cannot pull carries max(0, p_0 + p) in total, p_0 being the pressure under the
-weight, so its force beyond that of rest is max(0, p_0 + p) - max(0, p_0). Total pressures are reported; under
-a void they are zero.
+weight, so its force beyond that of rest is max(0, p_0 + p) - max(0, p_0). Where a gap is open at rest p_0 is
+negative, -factor k times its height: the bed carries once the gap has closed. Spring and damper together never
+pull, so that the bed only takes energy: it gives back no more than its spring holds. Total pressures are reported;
+under a void they are zero.
 
 Plate DOFs of a slab come first, then its rigid lateral displacement and yaw.
 """
@@ -18,11 +20,12 @@ from tiengine.kernels.types import Array, Ints1, Ints2, Real, Reals1, Reals2, Re
 def bed_force_and_pressure(
     # Model:
     design,
+    rest_row,
     index: Array,
     shape: Array,
     weight: Array,
     factor: Array,
-    weight_pressure: Array,
+    rest_pressure: Array,
     lateral_K: Array,
     lateral_C: Array,
     k,
@@ -41,11 +44,12 @@ def bed_force_and_pressure(
 
     Args:
         design: Which slab design, first index of the tables of designs.
+        rest_row: Row of the pressures at rest.
         index: Plate DOFs of each element, shape (n_el, 12).
         shape: Deflection shapes at the quadrature points, shape (n_q, 12).
         weight: Areas of the quadrature points [m^2], shape (n_q,).
         factor: Bed factor, shape (n_design, n_el, n_q).
-        weight_pressure: Pressure under the slab's weight [Pa], shape (n_design, n_el, n_q).
+        rest_pressure: Pressure at rest, negative where a gap is open [Pa], shape (rows, n_el, n_q).
         lateral_K: Lateral bed on (lateral displacement, yaw) [N/m, N, N m], shape (n_design, 2, 2).
         lateral_C: The same for damping [N s/m, N s, N m s], shape (n_design, 2, 2).
         k: Bed stiffness per area [N/m^3].
@@ -76,7 +80,7 @@ def bed_force_and_pressure(
             for i in ti.static(range(12)):
                 linear += shape[q, i] * z[i]
             linear *= factor[design, e, q]
-            rest = weight_pressure[design, e, q]
+            rest = rest_pressure[rest_row, e, q]
             total = rest + linear
             carried = linear
             if no_tension == 1 and (total < 0.0 or rest < 0.0):
@@ -115,7 +119,7 @@ def add_bed_forces(
     shape: Reals2,
     weight: Reals1,
     factor: Reals3,
-    weight_pressure: Reals3,
+    rest_pressure: Reals3,
     lateral_K: Reals3,
     lateral_C: Reals3,
     k: Real,
@@ -139,7 +143,7 @@ def add_bed_forces(
         shape: Deflection shapes at the quadrature points, shape (n_q, 12).
         weight: Areas of the quadrature points [m^2], shape (n_q,).
         factor: Bed factor, shape (n_design, n_el, n_q).
-        weight_pressure: Pressure under the slab's weight [Pa], shape (n_design, n_el, n_q).
+        rest_pressure: Pressure at rest by design [Pa], shape (n_design, n_el, n_q).
         lateral_K: Lateral bed [N/m, N, N m], shape (n_design, 2, 2).
         lateral_C: Lateral bed's damping [N s/m, N s, N m s], shape (n_design, 2, 2).
         k: Bed stiffness per area [N/m^3].
@@ -154,11 +158,12 @@ def add_bed_forces(
         for s in range(start.shape[0]):
             p = bed_force_and_pressure(
                 design[b, s],
+                design[b, s],
                 index,
                 shape,
                 weight,
                 factor,
-                weight_pressure,
+                rest_pressure,
                 lateral_K,
                 lateral_C,
                 k,

@@ -6,6 +6,11 @@ for the damper's material rate, are made once a step for all trains. Signs as MO
 
 The slab's own share of a fastening stands in the slab's implicit block. The force on the slab is therefore taken with
 the slab at its predictor, that on the rail with the slab at the iterate.
+
+A hanging seat has a play g either way before it carries. With e = k u + rest, u its stretch since the train came and
+``rest`` k u at rest before, its spring holds e - min(max(e, -k g), k g), a share of e that goes up from nothing as the
+gap closes; damping, lateral force and couple are the same share of a sound seat's. Of the slab's motion in e the
+damper's part is not taken off: some micrometres. The slab's part of a hanging seat is explicit.
 """
 
 import taichi as ti
@@ -18,6 +23,17 @@ from tiengine.kernels.types import Array, Template
 # the slabs' motion takes off (vertical, lateral, moment) at the predictors, at the iterate; factor of the fastening;
 # smallest and largest force on the rail at a step's end since the host last set them.
 ON_RAIL, ON_SLAB, PULL_PREDICTED, PULL_ITERATE, FACTOR, SMALLEST, LARGEST, N_SEAT = 0, 3, 6, 9, 12, 13, 16, 19
+
+# Vectors of a seat in ``play``: k g, 0 of a seat that does not hang, and k u at rest, 0 likewise [N].
+PLAY, REST, N_PLAY = 0, 1, 2
+
+
+@ti.func
+def share_carried(e: Template, play: Template):
+    """Share of e that a spring with play holds; e and play in N, vectors."""
+    size = ti.max(e, -1.0 * e)  # the compiler knows no absolute value of vectors
+    share = ti.max(size - play, 0.0) / ti.max(size, 1e-12)
+    return ti.select(play > 0.0, share, 1.0)
 
 
 @ti.func
@@ -116,7 +132,7 @@ def seat_shapes(
 @ti.func
 def seat_forces(
     c: int, first: int, row_u: int, row_v: int, s0: float, last_pass: int, size: Array, constants: Array, place: Array,
-    shape: Array, rail: Array, seat: Array, lanes: Template,
+    shape: Array, rail: Array, seat: Array, play: Array, hanging: Template, lanes: Template,
 ):  # fmt: skip
     """Force of every fastening at the rails' rows ``row_u`` and ``row_v``; loads on the rails.
 
@@ -133,6 +149,8 @@ def seat_forces(
         shape: From :func:`seat_shapes`.
         rail: State of the rails; SEAT_LOAD is added to.
         seat: Vectors of the seats, see this module, shape (chunks seats N_SEAT,).
+        play: Vectors of hanging seats, see this module, shape (chunks seats N_PLAY,); read if ``hanging``.
+        hanging: 1 if some seats hang.
         lanes: Lanes of a vector.
     """
     zero = ti.Vector.zero(ti.f64, lanes)
@@ -140,7 +158,7 @@ def seat_forces(
     zone, length = constants[layout.ABSORBING_ZONE], constants[layout.LENGTH]
     u, v = 5 * row_u, 5 * row_v
     for j in range(size[at.SEATS]):
-        vertical, lateral, moment = zero, zero, zero
+        vertical, lateral, moment, spring = zero, zero, zero, zero
         start = (first + place[j, at.TOUCH_FIRST]) * at.RAIL_ROWS
         count = place[j, at.TOUCH_COUNT]
         for q in range(count):
@@ -148,6 +166,8 @@ def seat_forces(
             m = (j * at.TOUCHED + q) * at.N_SEAT_SHAPE
             x, dx = rail[k + u + at.THETA_X], rail[k + v + at.THETA_X]
             vertical = vertical + shape[m + at.PULL_U] * rail[k + u] + shape[m + at.PULL_V] * rail[k + v]
+            if ti.static(hanging == 1):
+                spring = spring + constants[layout.K_VERTICAL] * shape[m] * rail[k + u]
             moment = moment + shape[m + at.PULL_U] * x + shape[m + at.PULL_V] * dx
             foot, dfoot = rail[k + u + at.V_LATERAL] - arm * x, rail[k + v + at.V_LATERAL] - arm * dx
             lateral = lateral + shape[m + at.SIDE_U] * foot + shape[m + at.SIDE_V] * dfoot
@@ -161,9 +181,20 @@ def seat_forces(
         seat[p + ON_SLAB] = factor * (vertical - seat[p + PULL_PREDICTED])
         seat[p + ON_SLAB + 1] = factor * (lateral - seat[p + PULL_PREDICTED + 1])
         seat[p + ON_SLAB + 2] = factor * (moment - seat[p + PULL_PREDICTED + 2])
-        F_V = factor * (vertical - seat[p + PULL_ITERATE]) + ground * vertical
-        F_L = factor * (lateral - seat[p + PULL_ITERATE + 1]) + ground * lateral
-        M = factor * (moment - seat[p + PULL_ITERATE + 2]) + ground * moment - arm * F_L
+        F_V = factor * (vertical - seat[p + PULL_ITERATE])
+        F_L = factor * (lateral - seat[p + PULL_ITERATE + 1])
+        M = factor * (moment - seat[p + PULL_ITERATE + 2])
+        if ti.static(hanging == 1):
+            m = (c * size[at.SEATS] + j) * N_PLAY
+            g, rest = play[m + PLAY], play[m + REST]
+            share = share_carried(spring - seat[p + PULL_ITERATE] + rest, g)
+            held = factor * share_carried(rest, g) * rest
+            F_V, F_L, M = share * (F_V + factor * rest) - held, share * F_L, share * M
+            seat[p + ON_SLAB] = ti.select(g > 0.0, F_V, seat[p + ON_SLAB])
+            seat[p + ON_SLAB + 1] = ti.select(g > 0.0, F_L, seat[p + ON_SLAB + 1])
+            seat[p + ON_SLAB + 2] = ti.select(g > 0.0, M, seat[p + ON_SLAB + 2])
+        F_V, F_L = F_V + ground * vertical, F_L + ground * lateral
+        M = M + ground * moment - arm * F_L
         seat[p + ON_RAIL], seat[p + ON_RAIL + 1], seat[p + ON_RAIL + 2] = F_V, F_L, M
         if last_pass == 1:
             for m in ti.static(range(3)):

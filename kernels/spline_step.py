@@ -68,7 +68,7 @@ def sweep_slabs(
             slabs.clear_loads(slab, base, dofs)
 
 
-def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, moving: int, own: int) -> Any:
+def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, moving: int, own: int, hanging: int) -> Any:
     """Make the kernel.
 
     Args:
@@ -79,6 +79,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, movi
         shaped: 1 if rails have shapes or wheels are out of round.
         moving: 1 if the ground moves in time.
         own: 1 if wheels have radii and contact tables of their own.
+        hanging: 1 if some seats hang.
     """
     lane_vectors = ti.types.ndarray(dtype=ti.types.vector(lanes, ti.f64), ndim=1)
     eights = ti.types.ndarray(dtype=ti.types.vector(8, ti.f64), ndim=1)
@@ -99,6 +100,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, movi
         coefficient: Reals1,
         # seats
         seat: lane_vectors,
+        seat_play: lane_vectors,
         seat_point: Reals2,
         span: Reals2,
         seat_place: Ints2,
@@ -205,7 +207,7 @@ def step_kernel(lanes: int, K: int, blocks: int, patches: int, shaped: int, movi
                 if stages & at.SEAT_FORCE_STAGE:
                     seats.seat_forces(
                         c, first, row_u, row_v, s0, last_pass, size, constants, seat_place, seat_shape, rail, seat,
-                        lanes,
+                        seat_play, hanging, lanes,
                     )  # fmt: skip
                 if stages & at.FORWARD_STAGE:
                     if ti.static(moving == 1):

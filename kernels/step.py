@@ -142,8 +142,8 @@ def mortar_forces(
                 for i in range(base, base + n):
                     motion[at.F, i] = 0.0
                 pressure = mortar.bed_force_and_pressure(
-                    design[b, slot], index, shape, weight, factor, at_rest, lateral_K, lateral_C, numbers[0],
-                    numbers[1], explicit, no_tension, base, n, motion, rows[0], rows[1], at.F,
+                    design[b, slot], design[b, slot], index, shape, weight, factor, at_rest, lateral_K, lateral_C,
+                    numbers[0], numbers[1], explicit, no_tension, base, n, motion, rows[0], rows[1], at.F,
                 )  # fmt: skip
                 for m in ti.static(range(2)):
                     pressure_out[b, slot, m] = pressure[m]

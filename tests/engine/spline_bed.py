@@ -266,9 +266,12 @@ def make_bed(
     record = np.zeros((B, steps, W, 2, at.N_WHEEL_RECORD[given.contact.patches]))
     body_record = np.zeros((B, steps, 3, train.n_dof))
     slab_record = aligned_zeros((B * steps * state.groups * state.slab_dofs * 3, 8))
+    factor, lateral_K, lateral_C = (
+        np.concatenate([f, f[:1]]) for f in (model.bed_factor, model.bed_lateral_K, model.bed_lateral_C)
+    )
+    rest = np.repeat(model.bed_rest[:1], given.slots, axis=0)
     slab_bed = SlabBed(
-        model.bed_index, model.bed_shape, model.bed_weight, *(np.concatenate([f, f[:1]]) for f in (
-            model.bed_factor, model.bed_rest, model.bed_lateral_K, model.bed_lateral_C)), model.bed_numbers,
+        model.bed_index, model.bed_shape, model.bed_weight, factor, rest, lateral_K, lateral_C, model.bed_numbers,
         np.zeros((B, given.slots, 2)),
     )  # fmt: skip
     step = SplineStep(

@@ -149,9 +149,3 @@ def test_bad_displacements_are_refused(scenario, table, said):
         load_scenario(scenario, [f"track.ground=[{{{table}}}]"])
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_a_bed_without_tension_is_refused():
-    table = "track.ground=[{kind='cosine', at=100, length=20, depth=0.01}]"
-    with pytest.raises(InputError, match=r"track\.ground: must be left out with a bed that transmits no tension"):
-        load_scenario("default", [table, "track.mortar_no_tension=true"])

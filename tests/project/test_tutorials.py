@@ -38,6 +38,12 @@ SHORTER = {
         "[0] + 10.0": "[0] + 1.0",
         "in (0.010, 0.020)": "in (0.010,)",
     },
+    "unsupported_corner": {
+        "distance = 60.0": "distance = 26.0",
+        "taper = 10.0": "taper = 5.0",
+        "run_in = 15.0": "run_in = 1.0",
+        '"train.distance": 25.0': '"train.distance": 17.0',
+    },
     "own_profiles": {"distance = 150.0": "distance = 5.0"},
     "hundred_trains": {
         "size = 100 ": "size = 4 ",

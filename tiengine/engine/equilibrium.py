@@ -32,6 +32,7 @@ FORCE_TOLERANCE = 1e-4  # N: a billionth of a wheel load
 EASY_FRICTION = 0.3  # from the guess Newton's method is known to converge
 FRICTION_RATIO = 1.5  # from one friction to the next, where the creep forces change by a few per cent
 FIRST_SHARE, SMALLEST_SHARE = 0.25, 1.0 / 256.0  # of the given loads: a step towards them
+SETTLING = 6  # times that the bed may carry elsewhere; what is left is a newton at the edge of a contact
 NUDGE_COORDINATE = 1e-8  # m, rad
 NUDGE_RATE = 1e-6  # rad/s
 NUDGE_FORCE = 1.0  # N
@@ -115,6 +116,13 @@ def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 
     given = _given(model, X, V, V_rate)
     problem = _Problem(model, track, V, V_rate, given)
     y = problem.solve()
+    for _ in range(SETTLING):
+        settled = track.settled(problem.split(y[None])[2][0])
+        if settled is None:
+            break
+        track = settled
+        problem = _Problem(model, track, V, V_rate, given)
+        y = problem.solve()
     x, rates, rail_force = problem.split(y[None])
     vertical, lateral, slabs = track.motion(rail_force[0])
     state.put(DISPLACEMENT, "vehicles", x[0])

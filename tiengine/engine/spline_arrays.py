@@ -31,6 +31,7 @@ class SplineArrays:
         functions: n.
         rail: State of the rails, shape (vectors, lanes).
         seat: Vectors of the seats (``spline_seats``), shape (chunks seats N_SEAT, lanes).
+        seat_play: Vectors of hanging seats (``spline_seats``), shape (chunks seats N_PLAY, lanes); a row if none hangs.
         under: Rails under the wheels (``spline_wheels``), shape (chunks W N_UNDER, lanes).
         slab: State of the slabs, shape (vectors, 8).
         slab_seat: Seats' rows of the slabs, shape (trains groups 5 seats a slab, 8), trains filled up to whole chunks.
@@ -46,6 +47,7 @@ class SplineArrays:
     cars: CarTables
     rail: Floats
     seat: Floats
+    seat_play: Floats
     under: Floats
     slab: Floats
     slab_seat: Floats
@@ -55,9 +57,9 @@ class SplineArrays:
     @classmethod
     def at_rest(
         cls, trains: int, lanes: int, functions: int, seats: int, wheelsets: int, slots: int, slabs: SlabTables,
-        cars: CarTables,
+        cars: CarTables, some_hang: bool = False,
     ) -> SplineArrays:  # fmt: skip
-        """All zero, all fastenings sound, all slabs of the first design."""
+        """All zero, all fastenings sound, all slabs of the first design; seats may come to hang if ``some_hang``."""
         chunks, groups = -(-2 * trains // lanes), -(-slots // 8)
         whole = chunks * lanes // 2
         N, K, per_slab = slabs.dofs, slabs.half_width, len(slabs.seat_x)
@@ -70,6 +72,7 @@ class SplineArrays:
             cars=cars,
             rail=aligned_zeros((chunks * (functions + 2 * at.REACH) * at.RAIL_ROWS, lanes)),
             seat=aligned_zeros((chunks * seats * seat_rows.N_SEAT, lanes)),
+            seat_play=aligned_zeros((chunks * seats * seat_rows.N_PLAY if some_hang else 1, lanes)),
             under=aligned_zeros((chunks * wheelsets * wheel_vectors.N_UNDER, lanes)),
             slab=aligned_zeros((whole * groups * (N + 2 * K) * at.SLAB_ROWS, 8)),
             slab_seat=aligned_zeros((whole * groups * at.SLAB_SEAT_ROWS * per_slab, 8)),
@@ -149,6 +152,16 @@ class SplineArrays:
         for b in range(self.trains):
             c, t = divmod(b, self.lanes // 2)
             whole[c, :, seat_rows.FACTOR, t] = factors[b]
+
+    @property
+    def some_hang(self) -> bool:
+        """Whether seats may hang."""
+        return len(self.seat_play) > 1
+
+    def set_seat_plays(self, play: Floats, rest: Floats) -> None:
+        """Play k_v g of the hanging seats in the window, and their k_v u at rest [N], shape (seats, 2) each."""
+        vectors = self.seat_play.reshape(-1, len(play), seat_rows.N_PLAY, self.lanes // 2, 2)
+        vectors[:, :, seat_rows.PLAY], vectors[:, :, seat_rows.REST] = play[:, None], rest[:, None]
 
     def forget_extremes(self) -> None:
         """Let the seats' smallest and largest forces start anew; rows SMALLEST, LARGEST of :meth:`seats`."""

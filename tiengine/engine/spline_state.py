@@ -63,8 +63,9 @@ class SplineState(State):
         B, W = g.trains, len(g.wheel_s)
         rows = layout.CONTACT_ROWS[g.contact.patches]
         held = SplineArrays.at_rest(
-            B, lanes or lanes_for(B), model.functions.count, g.seats, W, g.slots, tables.slabs, tables.cars
-        )
+            B, lanes or lanes_for(B), model.functions.count, g.seats, W, g.slots, tables.slabs, tables.cars,
+            g.seat_plays is not None,
+        )  # fmt: skip
         wheels = Contact(
             wheel=model.wheel,
             table=g.contact_values,
@@ -75,7 +76,8 @@ class SplineState(State):
             iterations=np.zeros((B, W), dtype=np.int32),
         )
         bed = Bed(
-            model.bed_index, model.bed_shape, model.bed_weight, model.bed_factor, model.bed_rest,
+            model.bed_index, model.bed_shape, model.bed_weight, model.bed_factor,
+            np.zeros((g.slots, *model.bed_rest.shape[1:])),
             model.bed_lateral_K, model.bed_lateral_C, model.bed_numbers, np.zeros((B, g.slots, 2)),
         )  # fmt: skip
         return cls(tables, held, wheels, bed)
@@ -218,6 +220,8 @@ class SplineState(State):
             "slab_design": held.slab_design,
             "car": held.car,
             "pressure": self.bed.pressure,
+            "bed_rest": self.bed.rest,
+            "seat_play": held.seat_play,
             "contact": wheels.contact,
             "force": wheels.force,
             "wheelset_force": wheels.wheelset_force,
@@ -231,12 +235,15 @@ class SplineState(State):
         if first_seat != self.first_seat:
             factors = ingredients.seat_factors(first_seat, ingredients.seats)
             self.held.set_seat_factors(np.broadcast_to(factors, (self.trains, *factors.shape)))
+            if self.held.some_hang:
+                self.held.set_seat_plays(*ingredients.hanging_seats(first_seat))
             self.first_seat = first_seat
         if first_slab != self.first_slab:
             slots = self.slots
             fresh = range(max(first_slab, self.first_slab + slots), first_slab + slots)
             for slab in fresh if self.first_slab >= 0 else range(first_slab, first_slab + slots):
                 self.held.enter_slab(slab % slots, ingredients.designs.of_slab.get(slab, 0))
+                self.bed.rest[slab % slots] = ingredients.pressure_at_rest(slab)
             self.first_slab = first_slab
 
 

@@ -78,7 +78,8 @@ class Bed:
 
     Attributes:
         index, shape, weight: Quadrature.
-        factor, rest: Factors and pressures at rest by design.
+        factor: Factors by design.
+        rest: Pressures at rest of the slab in each slot [Pa], shape (slots, n_el, n_q); set as slabs enter.
         lateral_K, lateral_C: Lateral bed by design, shape (designs, 2, 2).
         numbers: k_m, c_m, explicit, no tension.
         pressure: Largest and smallest pressure of each slab [Pa], shape (B, slots, 2); filled.
@@ -173,7 +174,7 @@ class SplineStep:
         arrays = (
             self.job, self.limits, self._stopped, self.record, size, dims, constants, clock,
             state.rail, rails.coefficient,
-            state.seat, seats.point, spans.span, seats.place, seats.shape,
+            state.seat, state.seat_play, seats.point, spans.span, seats.place, seats.shape,
             state.slab, state.slab_seat, state.slab_design, slab_record, slabs.coefficient,
             slabs.seat_index, slabs.seat_shape, slabs.seat_x,
             state.car, cars.columns, car_load, cars.columns_start, cars.vehicle_place, cars.wheelset_place,
@@ -185,12 +186,21 @@ class SplineStep:
             body_record, bed.index, bed.shape, bed.weight, bed.factor, bed.rest, bed.lateral_K, bed.lateral_C,
             bed.numbers, slab_rows, bed.pressure,
         )  # fmt: skip
-        vectors = (state.rail, state.seat, state.under, state.slab, state.slab_seat, state.slab_design, slab_record,
-                   state.car, cars.columns, car_load)  # fmt: skip
+        vectors = (state.rail, state.seat, state.seat_play, state.under, state.slab, state.slab_seat,
+                   state.slab_design, slab_record, state.car, cars.columns, car_load)  # fmt: skip
         shaped = int(irregularity.shape[-1] > layout.N_IRREGULARITY)
         self.launch = VectorLaunch(
             step_kernel,
-            (state.lanes, slabs.half_width, cars.blocks, contact.patches, shaped, int(moving), contact.own),
+            (
+                state.lanes,
+                slabs.half_width,
+                cars.blocks,
+                contact.patches,
+                shaped,
+                int(moving),
+                contact.own,
+                int(state.some_hang),
+            ),
             arrays,
             frozenset(i for i, array in enumerate(arrays) if any(array is vector for vector in vectors)),
         )

@@ -30,11 +30,12 @@ from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 
-__all__ = ["TOLERATED_GROWTH", "Growth", "of_trains", "step_growth", "with_stiffest_seats"]
+__all__ = ["TOLERATED_GROWTH", "Growth", "of_trains", "step_growth", "with_gaps_closed", "with_stiffest_seats"]
 
 TRACK = ("vertical", "lateral", "slabs")
 
 ENERGY_SIZE = 3e-7  # J a coordinate, 1e-4 m/s of a metre of rail: above the contact's tolerance, which is still linear
+CLOSED = 1e-15  # m: the play of a hanging seat whose gap is closed
 LIFT = -100.0  # m: wheels fall by less within a trial
 
 SHARE = 0.4
@@ -90,7 +91,20 @@ def with_stiffest_seats(ingredients: Ingredients, factor: float) -> Ingredients:
         ingredients,
         seat_factors=lambda first, count: np.full((count, 2), factor),
         designs=SlabDesigns(designs.matrices[:1], np.full_like(designs.seat_scale[:1], factor), {}),
+        seat_plays=None,
+        dead=None,
     )
+
+
+def with_gaps_closed(ingredients: Ingredients) -> Ingredients:
+    """The track of a run with all gaps closed: the bed in contact, hanging seats with as good as no play.
+
+    Args:
+        ingredients: Of the run.
+    """
+    plays = ingredients.seat_plays
+    closed = None if plays is None else lambda first, count: np.where(plays(first, count) > 0.0, CLOSED, 0.0)
+    return replace(ingredients, seat_plays=closed, dead=None)
 
 
 def of_trains(model: Model, trains: int) -> Model:

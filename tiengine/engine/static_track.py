@@ -85,6 +85,13 @@ class StaticTrack:
         under: NDArray[np.float64] = np.einsum("wrfk,bk->bwrf", self._compliance, flat)
         return under
 
+    def settled(self, force: Reals) -> None:
+        """See :class:`tiengine.engine.steady.Track`: the bed is linear.
+
+        Args:
+            force: Forces at the wheels, shape (W, 2, 3).
+        """
+
     def motion(self, force: Reals) -> tuple[Reals, Reals, Reals]:
         """Generalised coordinates under wheel forces.
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 from tiengine.engine import backend
 from tiengine.engine.chunk import Chunk
 from tiengine.engine.kinds import make_stepper, state_at_rest
-from tiengine.engine.stability import of_trains, step_growth, with_stiffest_seats
+from tiengine.engine.stability import of_trains, step_growth, with_gaps_closed, with_stiffest_seats
 from tiengine.engine.vector_mode import lanes_for
 from tiengine.irregularity.base_motion import GroundRecord, check_record
 from tiengine.irregularity.irregularity import IrregularityParams
@@ -120,20 +120,22 @@ def _waves_of_shapes(scenario: Scenario, tables: WheelTables | None) -> list[tup
 
 
 def _instability(scenario: Scenario, model: Model, lanes: int) -> str:
-    """How the step of a model fails the trials over the scenario's run: on sound seats, on all as its stiffest."""
+    """How the step of a model fails the trials over the scenario's run: as it is, gaps closed, on stiffest seats."""
     V, stiffest = scenario.train.speed.fastest, largest_factor(scenario.track.failed_fastenings)
     trial = (_Key.of(scenario).text, model.ingredients.newmark.dt, model.ingredients.passes, V, lanes)
     if trial in _passed:
         return ""
     steps = scenario.train.distance / (V * model.ingredients.newmark.dt)
-    tracks = [("", model)]
+    tracks, g = [("", model)], model.ingredients
+    if g.dead is not None and g.dead.uneven:
+        tracks.append((" with gaps closed", replace(model, ingredients=with_gaps_closed(g))))
     if stiffest > 1.0:
-        stiffened = with_stiffest_seats(model.ingredients, stiffest)
+        stiffened = with_stiffest_seats(g, stiffest)
         tracks.append((f" on seats stiffened by {stiffest:g}", build_model(stiffened, V)))
-    for seats, tried in tracks:
+    for words, tried in tracks:
         growth = step_growth(tried, V, steps, lanes)
         if not growth.tolerable(steps):
-            return f"an oscillation{seats} grows by a factor {growth.over(100):.3g} in 100 steps"
+            return f"an oscillation{words} grows by a factor {growth.over(100):.3g} in 100 steps"
     _passed.add(trial)
     return ""
 

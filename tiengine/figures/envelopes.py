@@ -51,12 +51,15 @@ def draw(train: Train) -> Figure:
     if enlarged:
         above, below = figure.subfigures(2, 1, height_ratios=(1.0, 2.4), squeeze=False)[:, 0]
         _enlarge(above, enlarged)
-    axes = below.subplots(4 + len(shapes), 1, sharex=True)
+    lifts = "largest_opening" in slabs.values and bool(slabs["largest_opening"].any())
+    axes = below.subplots((5 if lifts else 4) + len(shapes), 1, sharex=True)
     _vertical(axes[0], seats)
     _lateral(axes[1], seats)
     _pressure(axes[2], slabs)
     _moments(axes[3], slabs)
-    for panel, draw_shape in zip(axes[4:], shapes, strict=True):
+    if lifts:
+        _openings(axes[4], slabs)
+    for panel, draw_shape in zip(axes[5 if lifts else 4 :], shapes, strict=True):
         draw_shape(panel)
     for panel in axes:
         _mark(panel, seats, slabs)
@@ -156,6 +159,17 @@ def _shape(axes: Axes, x: Reals, values: Reals, look: Look) -> None:
     axes.plot(*curve.line, rasterized=curve.is_thinned, **look._asdict())
     if not axes.yaxis_inverted():
         axes.invert_yaxis()
+
+
+def _openings(axes: Axes, slabs: Extremes) -> None:
+    for name, look in (
+        ("opening_at_rest", Look("0.6", "-")),
+        ("largest_opening", Look(BLACK, "-")),
+        ("smallest_opening", Look(BLACK, "--")),
+    ):
+        _line(axes, slabs, slabs[name], look, 1e3, drawstyle="steps-mid")
+    title = "Opening under slabs: largest; grey: largest at rest; dashed: smallest there, 0 where it closes"
+    axes.set(ylabel="[mm]", title=title)
 
 
 def _mark(axes: Axes, seats: Extremes, slabs: Extremes) -> None:

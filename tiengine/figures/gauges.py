@@ -29,7 +29,7 @@ FORCES = {"vertical_force": (1e-3, "[kN]", VERTICAL), "lateral_force": (1e-3, "[
 
 @of_one_train
 def draw(train: Train) -> Figure:
-    """Draw one row per gauge: motion of rail or slab, or forces of a fastening, over time; passing wheelsets in grey.
+    """Draw one row per gauge: motion of rail or slab, forces of a fastening, opening of a gap; passing wheelsets grey.
 
     Args:
         train: The train.
@@ -48,7 +48,7 @@ def draw(train: Train) -> Figure:
     rows = figure.subfigures(len(shown), 1, squeeze=False)[:, 0]
     for row, (name, group) in zip(rows, shown, strict=True):
         row.suptitle(plain(_title(name, group)), x=0.01, ha="left", fontsize=8.0)
-        axes = row.subplots(1, 3 if "displacement" in group else 2)
+        axes = np.atleast_1d(row.subplots(1, 3 if "displacement" in group else 1 if "opening" in group else 2))
         _history(axes, group)
         for panel in axes:
             _mark_passings(panel, group, train)
@@ -74,6 +74,10 @@ def _history(axes: NDArray[np.object_], group: Any) -> None:
             for column, look in ((1, VERTICAL), (0, LATERAL)):
                 _plot(panel, group, scale * group[name][:, column].astype(np.float64), look)
             panel.set(title=name, ylabel=unit)
+        return
+    if "opening" in group:
+        _plot(axes[0], group, 1e3 * group["opening"][:].astype(np.float64), VERTICAL)
+        axes[0].set(title="opening between slab and bed", ylabel="[mm]")
         return
     for panel, (name, (scale, unit, look)) in zip(axes, FORCES.items(), strict=True):
         _plot(panel, group, scale * group[name][:].astype(np.float64), look)

@@ -144,6 +144,20 @@ def _slabs(train: Train) -> Iterator[KeyFigure]:
     for channel, name, scale, unit in rows:
         value, where = _at_largest(slabs, slabs[channel], "slab")
         yield KeyFigure(name, scale * value, unit, where)
+    if slabs.values.get("largest_opening", np.zeros(1)).any():
+        yield from _openings(slabs)
+
+
+def _openings(slabs: Extremes) -> Iterator[KeyFigure]:
+    """Openings between slabs and a bed without tension."""
+    value, where = _at_largest(slabs, slabs["opening_at_rest"], "slab")
+    yield KeyFigure("largest opening under a slab at rest", 1e3 * value, "mm", where)
+    value, where = _at_largest(slabs, slabs["largest_opening"], "slab")
+    yield KeyFigure("largest opening under a slab", 1e3 * value, "mm", where)
+    value, where = _at_largest(slabs, slabs["opening_at_rest"] - slabs["smallest_opening"], "slab")
+    yield KeyFigure("largest way that an opening closes", 1e3 * value, "mm", where)
+    value, where = _at_largest(slabs, slabs["closings"], "slab")
+    yield KeyFigure("most closings of the gap under a slab", value, "-", where)
 
 
 def _displaced_ground(train: Train) -> Iterator[KeyFigure]:

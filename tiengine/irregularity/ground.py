@@ -35,8 +35,8 @@ class Ground(Params):
     `cosine` is one wave depth (1 + cos)/2; `angles` are two straight ramps that meet in the middle, as where a pier has
     sunk between its neighbours; `ramp` is one straight ramp, with an angle at either end, behind which the ground stays
     displaced. `file` is a series with the columns `x`, `vertical` (down positive) and `alignment` (to the right), one
-    of these or both, as a measured track has them (docs/files.md). Slabs and rails follow with their stiffness; the bed
-    transmits tension. Entries add.
+    of these or both, as a measured track has them (docs/files.md). Slabs and rails follow with their stiffness; on a
+    bed that transmits no tension slabs may bridge a part of it and leave a gap. Entries add.
     """
 
     kind: Annotated[Literal["cosine", "angles", "ramp", "file"], Field(description="shape")]
@@ -118,23 +118,17 @@ def _read(path: str, taper: float, changed: int) -> MeasuredTrack:
     return MeasuredTrack(read_series(path, key="track.ground.file").values, taper)
 
 
-def check_ground(entries: Sequence[Ground], *, begin: float, end: float, no_tension: bool) -> None:
-    """Refuse displacements that no wheel reaches, and a bed that would leave a gap over them.
+def check_ground(entries: Sequence[Ground], *, begin: float, end: float) -> None:
+    """Refuse displacements that no wheel reaches.
 
     Args:
         entries: Entries of the scenario.
         begin: Chainage of the leading wheel at the start [m].
         end: Its chainage at the end of the run [m].
-        no_tension: Whether the bed transmits no tension.
 
     Raises:
         InputError: Names the entry, its value and the rule.
     """
-    if entries and no_tension:
-        raise InputError(
-            "track.ground: must be left out with a bed that transmits no tension (mortar_no_tension); gaps between"
-            " slab and settled ground are not modelled"
-        )
     for i, each in enumerate(entries):
         if each.file is not None:
             continue

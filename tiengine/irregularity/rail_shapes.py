@@ -21,7 +21,7 @@ from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
 
-__all__ = ["RailShape", "RailShapes", "SettledRail", "check_rail_shapes"]
+__all__ = ["Heights", "RailShape", "RailShapes", "SettledRail", "check_rail_shapes"]
 
 SIDES = {"left": (0,), "right": (1,), "both": (0, 1)}
 STEP = 1e-3  # m between the points of a filtered shape: a sixth of the patch
@@ -80,12 +80,13 @@ class RailShape(Params):
         return self
 
 
-class _Heights(Protocol):
+class Heights(Protocol):
     """Height of a running surface and its slope at chainages, and its shortest wave."""
 
     shortest: float
 
-    def evaluate(self, x: Reals) -> tuple[Reals, Reals]: ...
+    def evaluate(self, x: Reals) -> tuple[Reals, Reals]:
+        """Heights [m] and slopes at chainages [m], shape (n,) each."""
 
 
 class _Corrugation:
@@ -192,24 +193,28 @@ class RailShapes:
         waves: Shortest wave of each shape [m], in the order of the scenario.
     """
 
-    def __init__(self, shapes: Sequence[RailShape], settled: Sequence[SettledRail] = ()) -> None:
+    def __init__(
+        self, shapes: Sequence[RailShape], settled: Sequence[SettledRail] = (), laid: Sequence[Heights] = ()
+    ) -> None:
         """Read files and filter shapes.
 
         Args:
             shapes: Entries of the scenario.
             settled: Shapes of both rails over displaced ground.
+            laid: Shapes that the state at rest of a bed without tension leaves to the left and the right rail.
 
         Raises:
             InputError: A file breaks a rule.
         """
-        made: list[tuple[RailShape, _Heights]] = []
+        made: list[tuple[RailShape, Heights]] = []
         for i, shape in enumerate(shapes):
             where = f"track.rail_shapes[{i}]"
             made.append((shape, _made(shape, where)))
         self.waves = tuple(heights.shortest for _, heights in made)
         self._settled = tuple(settled)
         self._sides = tuple(
-            [*(heights for shape, heights in made if side in SIDES[shape.rail]), *settled] for side in range(2)
+            [*(heights for shape, heights in made if side in SIDES[shape.rail]), *settled, *laid[side : side + 1]]
+            for side in range(2)
         )
 
     def sample(self, x: Reals) -> tuple[Reals, Reals]:
@@ -231,7 +236,7 @@ class RailShapes:
         return value.reshape(np.shape(x)), slope.reshape(np.shape(x))
 
 
-def _made(shape: RailShape, where: str) -> _Heights:
+def _made(shape: RailShape, where: str) -> Heights:
     """Heights of one shape."""
     if shape.kind == "corrugation":
         return _Corrugation(shape)

@@ -19,7 +19,7 @@ from tiengine.kernels import layout as at
 from tiengine.model.implicit_seats import seat_inverse_terms
 from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
-from tiengine.track.slab_matrices import SlabMatrices, seat_shapes
+from tiengine.track.slab_matrices import SlabMatrices, bed_points, seat_shapes
 from tiengine.vehicle.train import static_wheel_loads
 
 __all__ = ["CONTACT_TOLERANCE", "MassAndStiffness", "Model", "SlabOperators", "shared_arrays", "slab_operators"]
@@ -79,7 +79,7 @@ def shared_arrays(ingredients: Ingredients) -> dict[str, Any]:
         "bed_index": first.bed_index,
         "bed_shape": first.bed_shape,
         "bed_weight": first.bed_weight,
-        "bed_points": _bed_points(first),
+        "bed_points": bed_points(first),
         "bed_factor": np.stack([slab.bed_factor for slab in designs]),
         "bed_rest": np.stack([slab.bed_weight_pressure for slab in designs]),
         "bed_lateral_K": np.stack([slab.K_bed[-2:, -2:] for slab in designs]),
@@ -158,12 +158,3 @@ def _constants(ingredients: Ingredients) -> Reals:
     c[at.TABLE_U0], c[at.TABLE_DU] = table.u_min, table.du
     c[at.TABLE_ALPHA0], c[at.TABLE_DALPHA], c[at.TABLE_ROWS] = table.alpha_min, table.dalpha, len(table.values)
     return c
-
-
-def _bed_points(slab: SlabMatrices) -> Reals:
-    """Slab coordinates to w at the quadrature points of all elements, shape (dofs, points)."""
-    elements, points = len(slab.bed_index), len(slab.bed_shape)
-    shapes = np.zeros((slab.n, elements, points))
-    for e, index in enumerate(slab.bed_index):
-        shapes[index, e] = slab.bed_shape.T
-    return shapes.reshape(slab.n, -1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +14,11 @@ from tiengine.irregularity.wheel_shapes import wheel_tables
 from tiengine.model.given_sources import given_sources
 from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.model.newmark import Newmark
+from tiengine.model.slabs_at_rest import slabs_at_rest
+from tiengine.parameters.arrays import Reals
 from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import Scenario
-from tiengine.track.defects import fastening_factors
+from tiengine.track.defects import FailedFastenings, fastening_factors, fastening_plays
 from tiengine.track.slab_matrices import slab_designs
 from tiengine.vehicle.train import TrainModel, assemble, with_wheel_radii
 
@@ -47,13 +49,15 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         train = replace(train, K=train.K + train.K_leaning)
     contacts = _contacts(scenario, train)
     train = with_wheel_radii(train, np.array(parts.wheel_radii))
+    designs = _designs(scenario)
+    dead = slabs_at_rest(scenario, designs)
     return Ingredients(
         rail=parts.rail,
         fastening=parts.fastening,
         seat_factors=_seat_factors(scenario),
         slab=parts.slab,
         mortar=parts.mortar,
-        designs=_designs(scenario),
+        designs=designs,
         train=train,
         contact=contacts.tables[0],
         contacts=None if contacts.alike else contacts,
@@ -69,8 +73,10 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         absorbing_zone=numerics.absorbing_zone,
         explicit_mortar=numerics.mortar == "explicit",
         given=given_sources(scenario, train),
-        shaped=bool(shapes or scenario.track.rail_shapes or scenario.track.ground),
+        shaped=bool(shapes or scenario.track.rail_shapes or scenario.track.ground or (dead and dead.uneven)),
         out_of_round=wheel_tables(shapes, parts.wheel_radii) if shapes else None,
+        seat_plays=_seat_plays(scenario),
+        dead=dead,
     )
 
 
@@ -87,10 +93,18 @@ def _seat_factors(scenario: Scenario) -> Callable[[int, int], NDArray[np.float64
     return lambda first, count: fastening_factors(failed, first, count)
 
 
+def _seat_plays(scenario: Scenario) -> Callable[[int, int], Reals] | None:
+    """Function that gives the gaps of consecutive seats [m], None if none hangs."""
+    failed = scenario.track.failed_fastenings
+    if not any(row.gap for row in failed):
+        return None
+    return lambda first, count: fastening_plays(failed, first, count)
+
+
 def _designs(scenario: Scenario) -> SlabDesigns:
-    """Sound design of the slabs, and one for each slab with a void or a failed fastening."""
+    """Sound design of the slabs, and one for each slab with a void or fastenings that failed or hang."""
     parts, track = scenario.parts, scenario.track
-    voids = track.mortar_voids
+    voids = [void for void in track.mortar_voids if void.factor != 1.0]  # those with a gap may be sound beyond it
     matrices, of_void = slab_designs(parts.slab, parts.mortar, voids, parts.fastening.baseplate)
     per_slab = parts.slab.fastenings
     damaged = set(of_void)
@@ -98,9 +112,15 @@ def _designs(scenario: Scenario) -> SlabDesigns:
         damaged.update(range(row.seats[0] // per_slab, row.seats[1] // per_slab + 1))
     order = sorted(damaged)
     sound = np.ones((per_slab, 2))
-    scales = [fastening_factors(track.failed_fastenings, slab * per_slab, per_slab) for slab in order]
+    scales = [_implicit_factors(track.failed_fastenings, slab * per_slab, per_slab) for slab in order]
     return SlabDesigns(
         matrices=(matrices[0], *(matrices[of_void.get(slab, 0)] for slab in order)),
         seat_scale=np.stack([sound, *scales]),
         of_slab={slab: i + 1 for i, slab in enumerate(order)},
     )
+
+
+def _implicit_factors(failed: Sequence[FailedFastenings], first: int, count: int) -> Reals:
+    """Factors of the fastenings whose share stands in the slab's implicit block: that of hanging ones does not."""
+    hang = fastening_plays(failed, first, count) > 0.0
+    return np.where(hang, 0.0, fastening_factors(failed, first, count))

@@ -16,6 +16,7 @@ from tiengine.kernels import layout as at
 from tiengine.model.base_motion_loads import BaseMotionLoads
 from tiengine.model.newmark import Newmark
 from tiengine.parameters.arrays import Reals
+from tiengine.track.dead_state import DeadState
 from tiengine.track.fastening import Fastening, seat_count
 from tiengine.track.knots import Grading, graded_knots
 from tiengine.track.mortar import Mortar
@@ -75,6 +76,8 @@ class Ingredients:
         out_of_round: Tables of wheels out of round; None where all are round.
         trains: Trains advanced together.
         given: What makes given loads of the train, beyond gravity.
+        seat_plays: Gaps of seats first..first+count-1 [m], 0 where none hangs, shape (count, 2); None if none hangs.
+        dead: State at rest of slabs on a bed without tension; None for slabs under their own weight alone.
     """
 
     rail: Rail
@@ -101,6 +104,44 @@ class Ingredients:
     contacts: WheelContacts | None = None
     trains: int = 1
     given: tuple[LoadSource, ...] = ()
+    seat_plays: Callable[[int, int], Reals] | None = None
+    dead: DeadState | None = None
+
+    def bound_factors(self, first: int, count: int) -> Reals:
+        """Factors of consecutive fastenings, 0 of those that hang: they carry nothing at rest, shape (count, 2).
+
+        Args:
+            first: Index of the first seat.
+            count: Number of seats.
+        """
+        factors = self.seat_factors(first, count)
+        return factors if self.seat_plays is None else np.where(self.seat_plays(first, count) > 0.0, 0.0, factors)
+
+    def hanging_seats(self, first: int) -> tuple[Reals, Reals]:
+        """Play of the window's seats and their springs at rest, k_v g and k_v u [N], shape (seats, 2) each; 0 if sound.
+
+        Args:
+            first: Index of the rear seat.
+        """
+        assert self.seat_plays is not None
+        play = self.fastening.vertical_stiffness * self.seat_plays(first, self.seats)
+        rest = np.zeros_like(play)
+        if self.dead is not None:
+            for j in np.flatnonzero((play > 0.0).any(axis=1)).tolist():
+                slab, seat = divmod(first + j, self.slab.fastenings)
+                rest[j] = self.dead.seat_force[self.dead.of(slab)][seat]
+        return play, np.where(play > 0.0, rest, 0.0)
+
+    def pressure_at_rest(self, slab: int) -> Reals:
+        """Pressure of the bed under a slab at rest, negative where a gap is open [Pa], shape (n_el, n_q).
+
+        Args:
+            slab: Index along the track.
+        """
+        if self.dead is None:
+            return self.designs.matrices[self.designs.of_slab.get(slab, 0)].bed_weight_pressure
+        pressure: Reals = self.dead.pressure[self.dead.of(slab)]
+        return pressure
 
     @property
     def load_sets(self) -> int:

@@ -22,10 +22,13 @@ from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Flags, Reals
 from tiengine.parameters.conventions import SIDES
 from tiengine.recording.seat_envelopes import watched_seats
-from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION
+from tiengine.recording.slab_openings import opening_at_rest
+from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION, GAUGE_OPENING
 from tiengine.result_files.layout import Block
 from tiengine.scenario.gauges import Gauge, nearest_seat, slab_under
 from tiengine.track.plate_shapes import W, shapes_at
+from tiengine.track.slab_matrices import bed_points
+from tiengine.track.slab_moments import bed_places
 
 __all__ = ["GaugeSamples", "gauge_samples"]
 
@@ -110,6 +113,41 @@ class SlabPlace:
             found[kind, :, 0] = motion[:, -2] + self._x * motion[:, -1]  # rigid in its plane
             found[kind, :, 1] = motion[:, self._index] @ self._shape
         return found
+
+
+@dataclass(eq=False)
+class GapPlace:
+    """A place of the bed under a slab: its quadrature point nearest to a gauge.
+
+    Attributes:
+        stepper: Is watched.
+        chainage: Of the gauge [m].
+        y: From the centre line, to the right [m].
+    """
+
+    stepper: Stepper
+    chainage: float
+    y: float
+
+    def __post_init__(self) -> None:
+        """Find the point, its opening at rest and its shapes."""
+        g = self.stepper.ingredients
+        self._slab, x = slab_under(self.chainage, g.slab)
+        along, across = bed_places(g.slab)
+        point = int(np.argmin((along - x) ** 2 + (across - self.y) ** 2))
+        rest = float(opening_at_rest(self.stepper, self._slab)[point])
+        self._rest = rest if np.isfinite(rest) else np.nan
+        self._shape = bed_points(g.designs.matrices[0])[:, point]
+
+    def read(self, X: float, V: float, V_rate: float) -> Reals | None:
+        """Opening, 0 in contact, shape (1, B)."""
+        state = self.stepper.state
+        first, slots = state.first_slab, state.slots
+        inside = 0.0 <= self.chainage - X <= self.stepper.ingredients.length
+        if not (inside and first <= self._slab < first + slots):
+            return None
+        w = state.slab_motion(DISPLACEMENT)[:, self._slab % slots] @ self._shape
+        return np.asarray(np.maximum(self._rest - w, 0.0)[None])
 
 
 @dataclass(eq=False)
@@ -208,6 +246,9 @@ def gauge_samples(gauge: Gauge, stepper: Stepper) -> GaugeSamples:
         seat = nearest_seat(gauge.chainage, ingredients.slab)
         place: Place = SeatPlace(state, seat, SIDES.index(gauge.side or "left"), watched_seats(ingredients))
         return GaugeSamples(stepper, place, tuple(GAUGE_FORCE), np.empty((0, 2, trains)))
+    if gauge.on == "gap":
+        place = GapPlace(stepper, gauge.chainage, gauge.y or 0.0)
+        return GaugeSamples(stepper, place, tuple(GAUGE_OPENING), np.empty((0, 1, trains)))
     if gauge.on == "rail":
         place = RailPlace(state, ingredients.length, gauge.chainage, SIDES.index(gauge.side or "left"))
     else:

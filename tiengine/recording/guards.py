@@ -19,10 +19,12 @@ from tiengine.engine.stepper import Plan, Stepper
 from tiengine.kernels import layout as at
 from tiengine.parameters.arrays import Flags
 from tiengine.parameters.conventions import SIDES
+from tiengine.recording.gap_watch import GapWatch
 from tiengine.recording.step_oscillation import WINDOW, StepOscillation
 from tiengine.result_files.channels import DOFS
 from tiengine.result_files.events import EVENT_KINDS, Event
 from tiengine.scenario.event_policy import Events
+from tiengine.scenario.tables import Track
 from tiengine.vehicle.train import static_wheel_loads
 
 __all__ = ["Guard", "Watch"]
@@ -53,22 +55,25 @@ class Watch:
         lifted: How long each wheel has carried nothing [s], shape (B, W, 2).
         last: Time at which each kind of event was last found at a wheel [s], shape (kinds, B, W, 2).
         ended: Whether the end of the measured track was passed, shape (B,).
+        closed: Whether each gap has closed before, shape (B, gaps).
         oscillation: Of the forces at the step's own frequency.
     """
 
     lifted: NDArray[np.float64]
     last: NDArray[np.float64]
     ended: NDArray[np.bool_]
+    closed: NDArray[np.bool_]
     oscillation: StepOscillation
 
     @classmethod
-    def fresh(cls, trains: int, wheelsets: int) -> Watch:
+    def fresh(cls, trains: int, wheelsets: int, gaps: int = 0) -> Watch:
         """Memory before the first check."""
         wheels = (trains, wheelsets, 2)
         return cls(
             lifted=np.zeros(wheels),
             last=np.full((5, *wheels), -np.inf),
             ended=np.zeros(trains, dtype=np.bool_),
+            closed=np.zeros((trains, gaps), dtype=np.bool_),
             oscillation=StepOscillation.none(trains, wheelsets),
         )
 
@@ -82,6 +87,7 @@ class Guard:
         policy: Consequences of each event, from the scenario.
         track_end: Chainage where each train's measured track ends [m], infinite without, shape (B,).
         watch: Memory from check to check.
+        gaps: Gaps that may close; None if there are none.
         found: Events since they were last taken, by place of the train.
         stopped: Number of the step in which a train was stopped, by its place.
         called: Whether the stepper looks at the state itself and calls for a check where it is needed.
@@ -91,21 +97,28 @@ class Guard:
     policy: Events
     track_end: NDArray[np.float64]
     watch: Watch
+    gaps: GapWatch | None = None
     found: dict[int, list[Event]] = field(default_factory=dict)
     stopped: dict[int, int] = field(default_factory=dict)
     called: bool = False
 
     @classmethod
-    def watching(cls, stepper: Stepper, policy: Events, track_end: NDArray[np.float64]) -> Guard:
+    def watching(
+        cls, stepper: Stepper, policy: Events, track_end: NDArray[np.float64], track: Track | None = None
+    ) -> Guard:
         """New guard, called by the stepper after each step.
 
         Args:
             stepper: Is watched.
             policy: Consequences of each event, from the scenario.
             track_end: See the class.
+            track: Of the scenario, whose gaps are watched.
         """
         trains, wheelsets, _ = stepper.state.normal_force.shape
-        guard = cls(stepper, policy, track_end, Watch.fresh(trains, wheelsets))
+        gaps = None if track is None else GapWatch.of(track, stepper)
+        watched = gaps if gaps is not None and gaps.count else None
+        watch = Watch.fresh(trains, wheelsets, 0 if watched is None else watched.count)
+        guard = cls(stepper, policy, track_end, watch, watched)
         guard.called = stepper.look_out(guard.lookout)
         stepper.watch("guards", guard.watch_step, due=guard.due)
         return guard
@@ -147,9 +160,9 @@ class Guard:
         self._set_always()
 
     def _set_always(self) -> None:
-        """Let every look be followed by a check while wheels fly, or where a measured track may end in this chunk."""
+        """Let a check follow every look while wheels fly, gaps may close, or a measured track may end in this chunk."""
         ends = bool(self._position[-1:].max(initial=-np.inf) + self._wheel_front > self._nearest_end)
-        self.lookout.always = self._flying or ends
+        self.lookout.always = self._flying or ends or self.gaps is not None
 
     def check_row(self, i: int) -> None:
         """Check the state after the step in row ``i`` of the chunk."""
@@ -191,6 +204,10 @@ class Guard:
             self._climb(step, time, position)
         if np.abs(self._tilt).max() > self._steepest_tilt or self._shift.min() < self._innermost:
             self._leaves_table(step, time, position)
+        if self.gaps is not None:
+            for train, side, words in self.gaps.fresh(self.gaps.closed(), self.watch.closed):
+                stops = self.policy.gap_closes == "stop"
+                self._report(train, step, Event("gap_closes", time, position, 0, side, words, stops))
         if position + self._wheel_front > self._nearest_end:
             self._track_ends(step, time, position)
 

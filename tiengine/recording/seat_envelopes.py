@@ -78,7 +78,7 @@ class SeatEnvelopes:
         none = np.empty((2, *self.largest.shape[:-1], 0))
         seats = np.concatenate([np.arange(0), *(first + np.arange(found.shape[-1]) for first, found in left)])
         largest, smallest = np.concatenate([none, *(found for _, found in left)], axis=-1)
-        factor = np.concatenate([np.ones((0, 2)), *(ingredients.seat_factors(int(seat), 1) for seat in seats)])
+        factor = np.concatenate([np.ones((0, 2)), *(ingredients.bound_factors(int(seat), 1) for seat in seats)])
         chainage: Reals = (seats + 0.5) * ingredients.slab.fastening_pitch
         return [
             Block(

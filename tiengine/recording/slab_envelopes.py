@@ -3,90 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiengine.engine.stepper import Stepper
 from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
 from tiengine.recording.slab_moments import SlabMoments
+from tiengine.recording.slab_openings import SlabOpenings
+from tiengine.recording.slot_extremes import SlotExtremes
 from tiengine.result_files.layout import Block
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.slab_matrices import seat_shapes
 
-__all__ = ["SlabEnvelopes", "SlotExtremes"]
+__all__ = ["SlabEnvelopes"]
 
 ROWS = 25
 """Samples of a product: its result stays in the cache while it is searched."""
-
-
-@dataclass(eq=False)
-class SlotExtremes:
-    """Running extremes by slot (see :mod:`tiengine.engine.state`); slabs that leave are reduced and put aside.
-
-    Attributes:
-        largest, smallest: Extremes of the slab in each slot, shape (B, slots, points).
-        starts: First point of each quantity; a quantity's points are reduced to one when a slab leaves.
-        first_slab: Rear slab, -1 before the first sample.
-    """
-
-    largest: NDArray[np.float64]
-    smallest: NDArray[np.float64]
-    starts: tuple[int, ...] = (0,)
-    first_slab: int = -1
-    _left: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list)
-
-    @classmethod
-    def of(cls, trains: int, slots: int, points: int, starts: tuple[int, ...] = (0,)) -> SlotExtremes:
-        """Extremes before the first sample."""
-        shape = (trains, slots, points)
-        return cls(np.full(shape, -np.inf), np.full(shape, np.inf), starts)
-
-    def move(self, first_slab: int) -> None:
-        """Put aside the slabs behind a new rear slab; their slots start again."""
-        if first_slab == self.first_slab:
-            return
-        slots = self.largest.shape[1]
-        for slab in range(self.first_slab, min(first_slab, self.first_slab + slots)) if self.first_slab >= 0 else ():
-            largest, smallest = self.largest[:, slab % slots], self.smallest[:, slab % slots]
-            reduced = np.maximum.reduceat(largest, self.starts, -1), np.minimum.reduceat(smallest, self.starts, -1)
-            self._left.append((slab, np.stack(reduced)))
-            largest[:], smallest[:] = -np.inf, np.inf
-        self.first_slab = first_slab
-
-    def add(self, largest: Reals, smallest: Reals, trains: slice = slice(None)) -> None:
-        """Take in new values.
-
-        Args:
-            largest: Largest values of the slabs in all slots since the last call, shape (B, slots, points).
-            smallest: Smallest values.
-            trains: Those of these trains.
-        """
-        np.maximum(self.largest[trains], largest, out=self.largest[trains])
-        np.minimum(self.smallest[trains], smallest, out=self.smallest[trains])
-
-    def take(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Slabs put aside since the last call: their indices (n,), largest and smallest (B, n, quantities)."""
-        left, self._left = self._left, []
-        none = np.empty((2, len(self.largest), 0, len(self.starts)))
-        largest, smallest = np.concatenate([none, *(extremes[:, :, None] for _, extremes in left)], axis=2)
-        return np.array([slab for slab, _ in left], dtype=np.int64), largest, smallest
-
-    def put_aside_all(self) -> None:
-        """Put aside all slabs."""
-        if self.first_slab >= 0:
-            self.move(self.first_slab + self.largest.shape[1])
-
-    def saved(self) -> dict[str, NDArray[np.float64]]:
-        """Values that the coming slabs depend on, when nothing is put aside."""
-        return {"largest": self.largest, "smallest": self.smallest, "first": np.array(float(self.first_slab))}
-
-    def restore(self, saved: Mapping[str, NDArray[np.float64]]) -> None:
-        """Continue from the values of :meth:`saved`."""
-        self.largest[:], self.smallest[:] = saved["largest"], saved["smallest"]
-        self.first_slab = int(saved["first"])
 
 
 @dataclass(eq=False)
@@ -95,10 +29,11 @@ class SlabEnvelopes:
 
     Attributes:
         stepper: Is watched.
-        void: Smallest factor of the voids under each slab that has one.
+        void: Smallest factor of the voids under each slab that has one, 0 over a gap.
         moments: Bending moments by the motion.
         shape: Deflection at the nodes and under the seats, moments at the places of :mod:`tiengine.track.slab_moments`.
         pressure: Of the mortar.
+        openings: Openings between slabs and bed; None if the bed has tension.
     """
 
     stepper: Stepper
@@ -106,6 +41,7 @@ class SlabEnvelopes:
     moments: SlabMoments
     shape: SlotExtremes
     pressure: SlotExtremes
+    openings: SlabOpenings | None = None
 
     def __post_init__(self) -> None:
         """Operator on the slabs' coordinates."""
@@ -116,12 +52,15 @@ class SlabEnvelopes:
         """Extremes before the first sample."""
         void: dict[int, float] = {}
         for each in scenario.track.mortar_voids:
-            void[each.slab] = min(each.factor, void.get(each.slab, each.factor))
+            factor = 0.0 if each.gap else each.factor
+            void[each.slab] = min(factor, void.get(each.slab, factor))
         moments, nodes = SlabMoments(stepper.ingredients), _deflections(stepper.ingredients).shape[1]
         trains, slots = stepper.state.trains, stepper.state.slots
         starts = (0, nodes, nodes + moments.points)
         shape = SlotExtremes.of(trains, slots, nodes + 2 * moments.points, starts)
-        return cls(stepper, void, moments, shape, SlotExtremes.of(trains, slots, 1))
+        dead = stepper.ingredients.dead
+        openings = None if dead is None else SlabOpenings(stepper, dead)
+        return cls(stepper, void, moments, shape, SlotExtremes.of(trains, slots, 1), openings)
 
     def blocks(self, time: Reals, position: Reals) -> list[Block]:
         """Take in the bodies' samples of the chunk; slabs that were left behind, train by train.
@@ -139,6 +78,8 @@ class SlabEnvelopes:
         """Take in samples with one rear slab: motion (B, rows, 3, slots, dofs), pressures (B, rows, slots, 2)."""
         self.pressure.move(rear)
         self.pressure.add(pressure[..., :1].max(axis=1), pressure[..., 1:].min(axis=1))
+        if self.openings is not None:
+            self.openings.take_in(rear, moved)
         self.shape.move(rear)
         for b, motion in enumerate(moved):
             for first in range(0, len(motion), ROWS):
@@ -150,17 +91,26 @@ class SlabEnvelopes:
         """Slabs still in memory."""
         self.shape.put_aside_all()
         self.pressure.put_aside_all()
+        if self.openings is not None:
+            self.openings.put_aside_all()
         return self._taken()
 
     def saved(self) -> dict[str, Reals]:
         """Values that the coming slabs depend on, when nothing is put aside."""
-        rows = {"shape": self.shape.saved(), "pressure": self.pressure.saved()}
+        rows = {name: part.saved() for name, part in self._parts.items()}
         return {f"{part}_{key}": value for part, saved in rows.items() for key, value in saved.items()}
 
     def restore(self, saved: Mapping[str, Reals]) -> None:
         """Continue from the values of :meth:`saved`."""
-        for part, extremes in (("shape_", self.shape), ("pressure_", self.pressure)):
-            extremes.restore({key.removeprefix(part): saved[key] for key in saved if key.startswith(part)})
+        for name, part in self._parts.items():
+            own = f"{name}_"
+            part.restore({key.removeprefix(own): saved[key] for key in saved if key.startswith(own)})
+
+    @property
+    def _parts(self) -> dict[str, SlotExtremes | SlabOpenings]:
+        """Memories by name."""
+        parts: dict[str, SlotExtremes | SlabOpenings] = {"shape": self.shape, "pressure": self.pressure}
+        return parts if self.openings is None else parts | {"openings": self.openings}
 
     def _taken(self) -> list[Block]:
         """Slabs that were put aside since the last call."""
@@ -176,6 +126,8 @@ class SlabEnvelopes:
             )
             for i, name in enumerate(names)
         }
+        if self.openings is not None:
+            columns |= self.openings.take()
         factor = np.array([self.void.get(int(index), 1.0) for index in slabs])
         chainage = np.asarray((slabs + 0.5) * slab.pitch, np.float64)
         return [

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 
 from tiengine.engine.bed_pressure import designs_in_slots
+from tiengine.engine.window import slabs_in_slots
 from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Reals
 from tiengine.track.slab_moments import moment_table, moments_of_motion, moments_of_pressure, pressures_felt
@@ -43,13 +44,15 @@ class SlabMoments:
         """
         rows, _, slots, dofs = motion.shape
         designs = designs_in_slots(self._given.designs.of_slab, np.array([rear]), slots)[0]
+        slabs = slabs_in_slots(np.array([rear]), slots)[0]
         moments = np.empty((rows, slots, 2 * self.points))
         for design in np.unique(designs).tolist():
             here = np.flatnonzero(designs == design)
             part = motion[:, :, here].transpose(0, 2, 1, 3).reshape(rows * len(here), 3 * dofs)
             values = part @ self._operator(design)
             if self._given.mortar.no_tension:
-                values += self._beyond_linear(design, part) @ self._of_pressure(design)
+                rest = np.stack([self._given.pressure_at_rest(int(slab)).ravel() for slab in slabs[here]])
+                values += self._beyond_linear(design, part, np.tile(rest, (rows, 1))) @ self._of_pressure(design)
             moments[:, here] = values.reshape(rows, len(here), -1)
         return moments
 
@@ -61,11 +64,10 @@ class SlabMoments:
         operator = moments_of_motion(g.slab, g.mortar, matrices, self._sound, free)
         return operator.reshape(-1, operator.shape[2])
 
-    def _beyond_linear(self, design: int, motion: Reals) -> Reals:
-        """Pressure of a bed without tension less that of the linear bed [Pa], shape (samples, points)."""
+    def _beyond_linear(self, design: int, motion: Reals, rest: Reals) -> Reals:
+        """Pressure of a bed without tension less that of the linear bed [Pa], shape (samples, points) as ``rest``."""
         mortar, matrices = self._given.mortar, self._given.designs.matrices[design]
         u, v, _ = np.split(motion, 3, axis=1)
         linear = (mortar.stiffness * u + mortar.damping * v) @ pressures_felt(matrices)
-        rest = matrices.bed_weight_pressure.ravel()
         beyond: Reals = np.maximum(rest + linear, 0.0) - np.maximum(rest, 0.0) - linear
         return beyond

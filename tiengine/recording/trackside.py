@@ -19,7 +19,7 @@ from tiengine.recording.deflection import Deflection
 from tiengine.recording.gauge_samples import gauge_samples
 from tiengine.recording.seat_envelopes import SeatEnvelopes
 from tiengine.recording.slab_envelopes import SlabEnvelopes
-from tiengine.result_files.channels import DEFLECTION, SEATS, SLABS
+from tiengine.result_files.channels import DEFLECTION, OPENINGS, SEATS, SLABS
 from tiengine.result_files.layout import DTYPES, Block, GroupSpec
 from tiengine.scenario.gauges import Gauge, nearest_seat
 from tiengine.scenario.scenario import Scenario
@@ -144,6 +144,8 @@ def trackside_groups(scenario: Scenario) -> dict[str, GroupSpec]:
     groups: dict[str, GroupSpec] = {}
     if out.envelopes:
         groups |= {name: GroupSpec.standard(name, tuple(channels)) for name, channels in ENVELOPES.items()}
+        if scenario.slabs_may_lift:
+            groups["slabs"] = GroupSpec.standard("slabs", (*SLABS, *OPENINGS))
     if out.deflection_interval != "none":
         groups["deflection"] = GroupSpec.standard("deflection", tuple(DEFLECTION))
     for gauge in scenario.gauges:
@@ -157,6 +159,8 @@ def _gauge_group(gauge: Gauge, slab: Slab) -> GroupSpec:
         seat = nearest_seat(gauge.chainage, slab)
         known = {"on": gauge.on, "chainage": (seat + 0.5) * slab.fastening_pitch, "seat": seat, "side": gauge.side}
         return GroupSpec.gauge("force", known)
+    if gauge.on == "gap":
+        return GroupSpec.gauge("opening", {"on": gauge.on, "chainage": gauge.chainage, "y": gauge.y})
     where = {"side": gauge.side} if gauge.on == "rail" else {"y": gauge.y}
     return GroupSpec.gauge("motion", {"on": gauge.on, "chainage": gauge.chainage, **where})
 

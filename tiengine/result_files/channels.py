@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 __all__ = [
-    "BODY", "DEFLECTION", "DIRECTIONS", "DOFS", "GAUGE_FORCE", "GAUGE_MOTION", "GROUPS", "IRREGULARITY", "MORTAR",
-    "PATCH", "SEATS", "SLABS", "WHEEL", "Channel",
+    "BODY", "DEFLECTION", "DIRECTIONS", "DOFS", "GAUGE_FORCE", "GAUGE_MOTION", "GAUGE_OPENING", "GROUPS",
+    "IRREGULARITY", "MORTAR", "OPENINGS", "PATCH", "SEATS", "SLABS", "WHEEL", "Channel",
 ]  # fmt: skip
 
 
@@ -91,7 +91,7 @@ SEATS = {
     "smallest_vertical_force": Channel("N", "smallest vertical force of the rail on the fastening, negative is uplift"),
     "largest_lateral_force": Channel("N", "largest lateral force of the rail on the fastening, positive to the right"),
     "smallest_lateral_force": Channel("N", "smallest lateral force of the rail on the fastening"),
-    "factor": Channel("1", "factor of the defects on the fastening's stiffness, 1 sound, 0 failed"),
+    "factor": Channel("1", "factor of the defects on the fastening's stiffness, 1 sound, 0 failed or hanging"),
 }
 """Extremes over all time steps."""
 
@@ -104,9 +104,21 @@ SLABS = {
     "smallest_moment_x": Channel("N m/m", "smallest bending moment along the track"),
     "largest_moment_y": Channel("N m/m", "largest bending moment across the track, positive with tension below"),
     "smallest_moment_y": Channel("N m/m", "smallest bending moment across the track"),
-    "mortar_factor": Channel("1", "smallest factor of the voids under the slab on its bed, 1 without voids"),
+    "mortar_factor": Channel(
+        "1", "smallest factor of the voids under the slab on its bed, 0 with a gap, 1 without voids"
+    ),
 }
 """Extremes over the area of the slab and over the samples of the bodies."""
+
+OPENINGS = {
+    "opening_at_rest": Channel("m", "largest opening between slab and bed before the train comes"),
+    "largest_opening": Channel("m", "largest opening between slab and bed anywhere under the slab"),
+    "smallest_opening": Channel(
+        "m", "smallest opening at the place where it is largest at rest, 0 if the gap closes there"
+    ),
+    "closings": Channel("1", "times that the gap closed at that place"),
+}
+"""Further extremes of slabs on a bed without tension, with splines; 0 for slabs that are sound among sound ones."""
 
 DEFLECTION = {
     "rail": Channel("m", "vertical deflection of the rail, positive down"),
@@ -126,6 +138,9 @@ GAUGE_FORCE = {
 }
 """Channels of a gauge on a fastening."""
 
+GAUGE_OPENING = {"opening": Channel("m", "opening between slab and bed, 0 in contact; NaN over a void without bed")}
+"""Channel of a gauge in a gap."""
+
 GROUPS = {
     "wheel": WHEEL,
     "patch": PATCH,
@@ -133,6 +148,6 @@ GROUPS = {
     "irregularity": IRREGULARITY,
     "mortar": MORTAR,
     "seats": SEATS,
-    "slabs": SLABS,
+    "slabs": SLABS | OPENINGS,
     "deflection": DEFLECTION,
 }

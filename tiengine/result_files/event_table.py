@@ -28,7 +28,9 @@ COLUMNS = {
     "position": ("f8", Channel("m", "chainage of the first vehicle's centre")),
     "kind": (
         TEXT,
-        Channel("1", "derailment, flange_climb, wheel_lift, oscillation, contact_range, track_end or runaway"),
+        Channel(
+            "1", "derailment, flange_climb, wheel_lift, oscillation, contact_range, track_end, gap_closes or runaway"
+        ),
     ),
     "wheelset": ("i4", Channel("1", "wheelset, 1 leads; 0 if the event concerns none")),
     "side": (TEXT, Channel("1", "left, right or empty")),

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 __all__ = ["EVENT_KINDS", "Event"]
 
-EVENT_KINDS = ("derailment", "flange_climb", "wheel_lift", "oscillation", "contact_range", "track_end")
+EVENT_KINDS = ("derailment", "flange_climb", "wheel_lift", "oscillation", "contact_range", "track_end", "gap_closes")
 
 
 class Event(NamedTuple):

@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.conventions import SIDES
-from tiengine.result_files.channels import DIRECTIONS, DOFS, GAUGE_FORCE, GAUGE_MOTION, GROUPS, Channel
+from tiengine.result_files.channels import (
+    DIRECTIONS,
+    DOFS,
+    GAUGE_FORCE,
+    GAUGE_MOTION,
+    GAUGE_OPENING,
+    GROUPS,
+    Channel,
+)  # fmt: skip
 
 __all__ = [
     "AUXILIARY", "AXES", "CHUNK", "DIMENSIONS", "DTYPES", "GAUGES", "GAUGE_DIMENSIONS", "SEAT", "SLAB", "TIME", "Axis",
@@ -65,8 +73,8 @@ DIMENSIONS = {
 GAUGES = "gauges"
 """Group that holds one group per gauge."""
 
-GAUGE_DIMENSIONS = {"motion": ("time", "direction"), "force": ("time",)}
-"""Dimensions of a gauge's channels: of one on a rail or slab, and of one on a fastening."""
+GAUGE_DIMENSIONS = {"motion": ("time", "direction"), "force": ("time",), "opening": ("time",)}
+"""Dimensions of a gauge's channels: of one on a rail or slab, of one on a fastening, of one in a gap."""
 
 AUXILIARY = {"wheelset_vehicle": "wheelset", "wheelset_offset": "wheelset", "offset": "point"}
 """Auxiliary coordinates and the dimension along which each runs."""
@@ -160,14 +168,14 @@ class GroupSpec:
         return cls(tuple(dimensions), channels, times_of, AXES[along], chunk)
 
     @classmethod
-    def gauge(cls, kind: Literal["motion", "force"], attributes: Mapping[str, Any]) -> GroupSpec:
+    def gauge(cls, kind: Literal["motion", "force", "opening"], attributes: Mapping[str, Any]) -> GroupSpec:
         """Specification of the group of a gauge.
 
         Args:
-            kind: ``"motion"`` of a rail or slab, ``"force"`` of a fastening.
+            kind: ``"motion"`` of a rail or slab, ``"force"`` of a fastening, ``"opening"`` of a gap.
             attributes: Attributes of the group.
         """
-        channels = {"motion": GAUGE_MOTION, "force": GAUGE_FORCE}[kind]
+        channels = {"motion": GAUGE_MOTION, "force": GAUGE_FORCE, "opening": GAUGE_OPENING}[kind]
         return cls(GAUGE_DIMENSIONS[kind][1:], channels, attributes=attributes)
 
 

@@ -20,6 +20,7 @@ class Events(Params):
         contact_range: A wheel is tilted beyond the contact table, or shifted beyond it on the field side: it keeps the
             geometry of the table's edge.
         track_end: The leading wheel reaches the end of a measured track; the track is smooth beyond it.
+        gap_closes: A gap of a mortar void, where it is largest, or of a hanging fastening closes for the first time.
     """
 
     derailment: Policy = "stop"
@@ -28,4 +29,5 @@ class Events(Params):
     oscillation: Policy = "stop"
     contact_range: Policy = "record"
     track_end: Policy = "record"
+    gap_closes: Policy = "record"
     wheel_lift_time: Annotated[float, Q("s", "time a wheel must be off its rail", ge=1e-3, le=10.0)] = 0.05

@@ -32,14 +32,14 @@ class Gauge(Params):
 
     Attributes:
         name: Its group in the result is gauges/NAME; letters, digits, _ and -.
-        on: Measured part.
+        on: Measured part; "gap" is the opening under a slab, at the bed's quadrature point nearest to the place.
         chainage: Position along the track; on a slab, not in a joint.
         side: Side of the rail or fastening.
-        y: Position on a slab, from the centre line, positive to the right.
+        y: Position on or under a slab, from the centre line, positive to the right.
     """
 
     name: Annotated[str, Field(max_length=100)]
-    on: Literal["rail", "slab", "fastening"]
+    on: Literal["rail", "slab", "fastening", "gap"]
     chainage: Annotated[float, Q("m", ge=0)]
     side: Literal["left", "right"] | None = None
     y: Annotated[float | None, Field(json_schema_extra={"unit": "m"})] = None
@@ -63,7 +63,9 @@ def slab_under(chainage: float, slab: Slab) -> tuple[int, float]:
     return index, chainage - (index + 0.5) * slab.pitch
 
 
-def check_gauges(gauges: Sequence[Gauge], *, begin: float, end: float, slab: Slab) -> None:
+def check_gauges(
+    gauges: Sequence[Gauge], *, begin: float, end: float, slab: Slab, slabs_may_lift: bool = False
+) -> None:
     """Refuse gauges that the run never reaches, that lie off the slab, or that share a name.
 
     Args:
@@ -71,6 +73,7 @@ def check_gauges(gauges: Sequence[Gauge], *, begin: float, end: float, slab: Sla
         begin: Chainage of the window's rear end at the start of the run [m].
         end: Chainage of its front end at the end of the run [m].
         slab: Pitches of seats and slabs and size of a slab.
+        slabs_may_lift: Whether a gap may open under a slab.
 
     Raises:
         InputError: Names the entry, its value and the rule.
@@ -85,7 +88,11 @@ def check_gauges(gauges: Sequence[Gauge], *, begin: float, end: float, slab: Sla
                 f"{where}.chainage = {gauge.chainage:g}: must be between {begin:g} and {end:g} m,"
                 " the range covered by the window"
             )
-        if gauge.on == "slab":
+        if gauge.on == "gap" and not slabs_may_lift:
+            raise InputError(
+                f"{where}.on = 'gap': needs a bed that transmits no tension, track.mortar_no_tension, and splines"
+            )
+        if gauge.on in ("slab", "gap"):
             _check_slab_gauge(where, gauge, slab)
         elif gauge.side is None:
             raise InputError(f"{where}.side: missing; a gauge on a {gauge.on} needs 'left' or 'right'")
@@ -94,11 +101,12 @@ def check_gauges(gauges: Sequence[Gauge], *, begin: float, end: float, slab: Sla
 
 
 def _check_slab_gauge(where: str, gauge: Gauge, slab: Slab) -> None:
-    """Check the rules of a gauge on a slab."""
+    """Check the rules of a gauge on or under a slab."""
+    kind = "on a slab" if gauge.on == "slab" else "in a gap"
     if gauge.side is not None:
-        raise InputError(f"{where}.side = {gauge.side!r}: a gauge on a slab has y instead")
+        raise InputError(f"{where}.side = {gauge.side!r}: a gauge {kind} has y instead")
     if gauge.y is None:
-        raise InputError(f"{where}.y: missing; a gauge on a slab needs its distance from the centre line in m")
+        raise InputError(f"{where}.y: missing; a gauge {kind} needs its distance from the centre line in m")
     if abs(gauge.y) > slab.width / 2.0:
         raise InputError(f"{where}.y = {gauge.y:g}: must be within half the slab's width, {slab.width / 2.0:g} m")
     index, x = slab_under(gauge.chainage, slab)

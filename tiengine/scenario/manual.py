@@ -18,7 +18,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION, GROUPS
+from tiengine.result_files.channels import GAUGE_FORCE, GAUGE_MOTION, GAUGE_OPENING, GROUPS
 from tiengine.result_files.layout import DIMENSIONS, GAUGE_DIMENSIONS
 from tiengine.scenario.key_checks import NumberOr
 from tiengine.scenario.profile_part import ProfilePoints
@@ -268,6 +268,7 @@ def channel_tables() -> str:
     groups = [(name, DIMENSIONS[name], channels) for name, channels in GROUPS.items()]
     groups.append(("gauges/NAME, on rail or slab", GAUGE_DIMENSIONS["motion"], GAUGE_MOTION))
     groups.append(("gauges/NAME, on a fastening", GAUGE_DIMENSIONS["force"], GAUGE_FORCE))
+    groups.append(("gauges/NAME, in a gap", GAUGE_DIMENSIONS["opening"], GAUGE_OPENING))
     lines: list[str] = []
     for name, dimensions, channels in groups:
         lines += ["", f"### {name}", "", f"Dimensions: {', '.join(dimensions)}.", ""]

@@ -37,6 +37,7 @@ from tiengine.track.fastening import check_baseplate
 from tiengine.track.knots import graded_knots
 from tiengine.track.seat_points import seat_points
 from tiengine.track.sines import Sines
+from tiengine.track.slab_warp import check_slab_warps
 from tiengine.track.splines import Splines
 from tiengine.vehicle.train import centre_in_window
 
@@ -90,6 +91,11 @@ class Scenario(Params):
     def parts(self) -> Parts:
         """Parts that the scenario refers to, built and checked once."""
         return build_parts(self.train, self.track, self.wind, self.presets)
+
+    @property
+    def slabs_may_lift(self) -> bool:
+        """Whether slabs may lift off their bed with rails that follow: a bed without tension, rails in splines."""
+        return self.parts.mortar.no_tension and self.numerics.trial_functions == "splines"
 
     @cached_property
     def window_length(self) -> float:
@@ -264,8 +270,14 @@ def _check(scenario: Scenario) -> None:
         end=scenario.rear + scenario.train.distance + window,
         slab=parts.slab,
     )
+    last_slab = int((scenario.rear + scenario.train.distance + window) / parts.slab.pitch)
+    check_slab_warps(scenario.track.slab_warps, last_slab)
     check_gauges(
-        scenario.gauges, begin=scenario.rear, end=scenario.rear + scenario.train.distance + window, slab=parts.slab
+        scenario.gauges,
+        begin=scenario.rear,
+        end=scenario.rear + scenario.train.distance + window,
+        slab=parts.slab,
+        slabs_may_lift=scenario.slabs_may_lift,
     )
 
 

@@ -28,8 +28,9 @@ def check_shapes(
         InputError: Names the key, its value and the rule.
     """
     check_rail_shapes(track.rail_shapes, begin=begin, end=begin + train.distance)
-    check_ground(track.ground, begin=begin, end=begin + train.distance, no_tension=no_tension)
+    check_ground(track.ground, begin=begin, end=begin + train.distance)
     check_wheel_shapes(train.wheel_shapes, wheelsets)
+    _check_gaps(track, numerics, no_tension)
     for key, given in (
         ("track.rail_shapes", track.rail_shapes),
         ("track.ground", track.ground),
@@ -38,3 +39,16 @@ def check_shapes(
     ):
         if given and numerics.trial_functions == "sines":
             raise InputError(f'{key}: must be left out with numerics.trial_functions = "sines"; splines know them')
+
+
+def _check_gaps(track: Track, numerics: Numerics, no_tension: bool) -> None:
+    """Check that a run with gaps or warped slabs has a bed that lets go, and rails that can follow."""
+    names = [f"track.mortar_voids[{i}].gap" for i, void in enumerate(track.mortar_voids) if void.gap is not None]
+    failed = track.failed_fastenings
+    names += [f"track.failed_fastenings[{i}].gap" for i, row in enumerate(failed) if row.gap is not None]
+    names += ["track.slab_warps"] if track.slab_warps else []
+    for name in names:
+        if not no_tension:
+            raise InputError(f"{name}: needs a bed that transmits no tension; set track.mortar_no_tension = true")
+        if numerics.trial_functions == "sines":
+            raise InputError(f'{name}: must be left out with numerics.trial_functions = "sines"; splines know it')

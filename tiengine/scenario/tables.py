@@ -25,6 +25,7 @@ from tiengine.track.alignment_file import MOST_ROWS
 from tiengine.track.defects import FailedFastenings
 from tiengine.track.knots import Grading
 from tiengine.track.mortar import MortarVoid
+from tiengine.track.slab_warp import SlabWarp
 from tiengine.vehicle.assembly import Effort
 from tiengine.vehicle.force_history import BodyForce
 from tiengine.vehicle.speed_programme import SpeedProfile
@@ -158,6 +159,7 @@ class Track(Params):
     rail_shapes: Annotated[tuple[RailShape, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
     base_motion: Annotated[BaseMotion, Field(description="table, see below")] = BaseMotion()
     ground: Annotated[tuple[Ground, ...], Field(description="tables, see below", max_length=MOST_SHAPES)] = ()
+    slab_warps: Annotated[tuple[SlabWarp, ...], Field(description="tables, see below", max_length=1000)] = ()
 
     @property
     def line(self) -> Alignment | None:

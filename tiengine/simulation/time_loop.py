@@ -21,7 +21,7 @@ from tiengine.engine.kinds import make_stepper, state_at_rest
 from tiengine.engine.state import State
 from tiengine.engine.stepper import Plan, Stepper
 from tiengine.engine.time_step import prepare
-from tiengine.irregularity.ground import ground_shape, reach_of
+from tiengine.irregularity.ground import LATERAL, Ground, ground_shape, reach_of
 from tiengine.irregularity.irregularity import Irregularity, make_irregularity
 from tiengine.irregularity.rail_shapes import RailShapes, SettledRail
 from tiengine.irregularity.shaped_channels import ShapedChannels
@@ -35,7 +35,8 @@ from tiengine.result_files.layout import Block, TrainLabels
 from tiengine.scenario.scenario import Scenario
 from tiengine.simulation.messages import Advanced
 from tiengine.simulation.tasks import Task
-from tiengine.track.settled_rail import settled_rail
+from tiengine.track.dead_state import LaidRail
+from tiengine.track.settled_rail import GroundShape, settled_rail
 
 __all__ = ["CHUNK_STEPS", "LoopTimer", "Run"]
 
@@ -137,7 +138,7 @@ class Run:
         tracks = [make_irregularity(track, lead, f) for track, f in zip_longest(task.tracks, task.functions)]
         start = scenario.rear + ingredients.centre_s
         check_reach(tracks, start + scenario.train.distance + float(ingredients.train.wheelset_x.max()))
-        guard = Guard.watching(stepper, scenario.events, np.array([track.end for track in tracks]))
+        guard = Guard.watching(stepper, scenario.events, np.array([track.end for track in tracks]), scenario.track)
         places = list(range(len(task.trains)))
         steps = np.zeros(len(places), np.int64)
         shapes = _shapes(scenario, model, start)
@@ -264,7 +265,7 @@ def _shapes(scenario: Scenario, model: Model, start: float) -> ShapedChannels | 
     settled = [
         SettledRail(
             settled_rail(
-                partial(ground_shape, each),
+                partial(ground_shape, each) if g.dead is None else _sideways(each),
                 reach_of(each),
                 g.rail,
                 g.fastening,
@@ -276,7 +277,14 @@ def _shapes(scenario: Scenario, model: Model, start: float) -> ShapedChannels | 
         )
         for each in scenario.track.ground
     ]
-    return ShapedChannels(RailShapes(scenario.track.rail_shapes, settled), start + train.wheelset_x, train.wheel_radius)
+    laid = [] if g.dead is None else [LaidRail(g.dead, side) for side in range(2)]
+    rails = RailShapes(scenario.track.rail_shapes, settled, laid)
+    return ShapedChannels(rails, start + train.wheelset_x, train.wheel_radius)
+
+
+def _sideways(ground: Ground) -> GroundShape:
+    """Displacement of the ground to the right alone: the state at rest of slabs that may lift has the vertical one."""
+    return lambda x, direction: ground_shape(ground, x, direction) if direction == LATERAL else np.zeros_like(x)
 
 
 def _started(scenario: Scenario, model: Model) -> State:

@@ -11,14 +11,14 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
-from tiengine.track.mortar import MortarVoid, check_void
+from tiengine.track.mortar import LARGEST_GAP, MortarVoid, check_void, sound_with_gap
 from tiengine.track.slab import Slab
 
-__all__ = ["FailedFastenings", "check_defects", "fastening_factors", "largest_factor"]
+__all__ = ["FailedFastenings", "check_defects", "fastening_factors", "fastening_plays", "largest_factor"]
 
 RAILS = {"left": (0,), "right": (1,), "both": (0, 1)}
 
@@ -28,7 +28,13 @@ SeatIndex = Annotated[int, Field(ge=0)]
 
 
 class FailedFastenings(Params):
-    """Consecutive fastenings of one rail or both, scaled by a factor."""
+    """Consecutive fastenings of one rail or both, scaled by a factor or hanging by a gap.
+
+    A hanging fastening carries nothing until the rail has come down by the gap, nor up to the same play above. Beyond
+    it is as stiff as `factor` says, which is 1 if it is left out; damping, lateral force and couple stand in the same
+    proportion to those of a sound one as the vertical force. The weight of the rail uses a part of the gap up. Splines
+    and a bed that transmits no tension are needed (`mortar_no_tension`).
+    """
 
     rail: Annotated[Literal["left", "right", "both"], Field(description="rail of the fastenings")] = "both"
     seats: Annotated[
@@ -36,6 +42,9 @@ class FailedFastenings(Params):
         Field(description="first and last; seat j stands at (j + 1/2) seat pitches"),
     ]
     factor: Annotated[float, Q("-", "0 failed, below 1 degraded; scales stiffness and damping", ge=0, le=10)] = 0.0
+    gap: Annotated[float | None, Q("m", "by which the fastenings hang", ge=0, le=LARGEST_GAP)] = None
+
+    _sound = model_validator(mode="before")(sound_with_gap)
 
 
 def fastening_factors(failed: Iterable[FailedFastenings], first: int, count: int) -> NDArray[np.float64]:
@@ -54,6 +63,25 @@ def fastening_factors(failed: Iterable[FailedFastenings], first: int, count: int
         for side in RAILS[row.rail]:
             factors[max(row.seats[0] - first, 0) : max(row.seats[1] + 1 - first, 0), side] *= row.factor
     return factors
+
+
+def fastening_plays(failed: Iterable[FailedFastenings], first: int, count: int) -> NDArray[np.float64]:
+    """Return the play of consecutive seats, the gap by which they hang [m].
+
+    Args:
+        failed: Entries of the scenario; where two overlap, the larger gap counts.
+        first: Index of the first seat.
+        count: Number of seats.
+
+    Returns:
+        Gaps, 0 where none hangs, shape (count, 2); side 0 is left.
+    """
+    plays = np.zeros((count, 2))
+    for row in failed:
+        for side in RAILS[row.rail]:
+            here = plays[max(row.seats[0] - first, 0) : max(row.seats[1] + 1 - first, 0), side]
+            np.maximum(here, row.gap or 0.0, out=here)
+    return plays
 
 
 def largest_factor(failed: Iterable[FailedFastenings]) -> float:

@@ -29,7 +29,7 @@ from tiengine.track.slab_moments import places
 from tiengine.track.splines import Splines
 from tiengine.track.steady_track import SeatsInWindow, SteadyTrack
 
-__all__ = ["settled_rail"]
+__all__ = ["GroundShape", "settled_rail"]
 
 BEYOND = 15.0  # m of track beyond either end of a displacement: fifteen decay lengths of a rail on its fastenings
 KNOTS = 0.2  # m

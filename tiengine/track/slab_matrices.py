@@ -76,6 +76,19 @@ def seat_shapes(slab: SlabMatrices) -> NDArray[np.float64]:
     return shapes.reshape(slab.n, 5 * seats)
 
 
+def bed_points(slab: SlabMatrices) -> NDArray[np.float64]:
+    """Slab coordinates to w at the quadrature points of all elements, shape (dofs, points).
+
+    Args:
+        slab: Its matrices.
+    """
+    elements, points = len(slab.bed_index), len(slab.bed_shape)
+    shapes = np.zeros((slab.n, elements, points))
+    for e, index in enumerate(slab.bed_index):
+        shapes[index, e] = slab.bed_shape.T
+    return shapes.reshape(slab.n, -1)
+
+
 def slab_matrices(
     slab: Slab, mortar: Mortar, voids: Sequence[MortarVoid] = (), baseplate: tuple[float, float] = POINT
 ) -> SlabMatrices:

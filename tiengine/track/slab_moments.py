@@ -42,10 +42,10 @@ from tiengine.track.fastening import POINT
 from tiengine.track.mortar import GAUSS, Mortar
 from tiengine.track.plate_shapes import WX, WXX, WY, WYY, W, element_dofs, locate, shapes_at, tabulate_shapes
 from tiengine.track.slab import Slab
-from tiengine.track.slab_matrices import SlabMatrices, seat_shapes
+from tiengine.track.slab_matrices import SlabMatrices, bed_points, seat_shapes
 
 __all__ = [
-    "GAUSS_POINTS", "MomentTable", "fine_mesh", "moment_rows", "moment_table", "moments_of_motion",
+    "GAUSS_POINTS", "MomentTable", "bed_places", "fine_mesh", "moment_rows", "moment_table", "moments_of_motion",
     "moments_of_pressure", "nodes", "places", "plate_matrices", "pressures_felt",
 ]  # fmt: skip
 
@@ -205,11 +205,7 @@ def pressures_felt(design: SlabMatrices) -> Reals:
     Args:
         design: Matrices of the slab.
     """
-    elements, points = design.bed_factor.shape
-    shapes = np.zeros((design.n, elements, points))
-    for e, index in enumerate(design.bed_index):
-        shapes[index, e] = design.bed_shape.T
-    return (shapes * design.bed_factor).reshape(design.n, -1)
+    return bed_points(design) * design.bed_factor.ravel()
 
 
 def _of_free_plate(slab: Slab, K: sp.csr_array, M: sp.csr_array, loads: Reals) -> Reals:
@@ -288,6 +284,15 @@ def _interpolation(slab: Slab, fine: Slab) -> sp.csr_array:
     column = np.repeat(index, 3, axis=0)
     values = table[:, [W, WX, WY]]
     return sp.csr_array((values.ravel(), (row, column.ravel())), shape=(fine.plate_dofs, slab.plate_dofs + 2))
+
+
+def bed_places(slab: Slab) -> tuple[Reals, Reals]:
+    """Coordinates of the bed's quadrature points, from the slab's centre [m], shape (points,) each.
+
+    Args:
+        slab: The slab with its mesh.
+    """
+    return places(slab, _quadrature(slab)[0])
 
 
 def plate_matrices(slab: Slab) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:

@@ -24,7 +24,7 @@ from tiengine.track.fastening import Fastening
 from tiengine.track.rail_operators import RailOperators
 from tiengine.track.slab_matrices import SlabMatrices
 
-__all__ = ["RIGID_GROUND", "SeatsInWindow", "SteadyTrack"]
+__all__ = ["RIGID_GROUND", "SeatsInWindow", "SteadyTrack", "track_stiffness", "vertical_stretch"]
 
 
 RIGID_GROUND = -1
@@ -65,6 +65,8 @@ class SteadyTrack:
         V: float,
         wheel_s: Reals,
         wheel_residual: Reals | None = None,
+        beds: Sequence[Reals] | None = None,
+        slab_load: Reals | None = None,
     ) -> None:
         """Assemble and factorise.
 
@@ -77,14 +79,12 @@ class SteadyTrack:
             wheel_s: Wheels in the window [m], shape (W,).
             wheel_residual: Static compliance that the trial functions lack under every wheel in w, v, theta_x,
                 shape (W, 3).
+            beds: Stiffness of the bed under each slab, shape (dofs, dofs); that of its design by default.
+            slab_load: Constant forces on the slabs, shape (slabs, dofs); none by default.
         """
         self._n, self._slabs = operators.functions.count, len(slabs)
-        stretch, flow, stiffness, damping = _springs(operators, fastening, seats, slabs)
-        rail = (operators.vertical(V)[2], operators.lateral(V)[2])
-        plates = [sp.csr_array(slab.K_plate + slab.K_bed) for slab in slabs]
-        pull = sp.diags_array(stiffness) @ stretch - V * sp.diags_array(damping) @ flow
-        K = sp.block_diag([*rail, *rail, *plates], format="csc") + stretch.T @ pull
-        self._lu: SuperLU = splu(sp.csc_array(K))
+        K = track_stiffness(operators, fastening, seats, slabs, beds or [slab.K_bed for slab in slabs], V)
+        self._lu: SuperLU = splu(K)
         value, slope = (_under_wheels(operators, wheel_s, d, K.shape[0]) for d in (0, 1))
         self._place = sp.csc_array(value.T)
         W = len(wheel_s)
@@ -96,6 +96,11 @@ class SteadyTrack:
             wheel, side, field = np.ix_(np.arange(W), np.arange(2), np.arange(3))
             moved[wheel, side, field, wheel, side, field] += wheel_residual[:, None]
         self._compliance = np.concatenate([moved, turned, np.zeros_like(moved)], axis=2)
+        self._own = np.zeros(K.shape[0])
+        if slab_load is not None:
+            self._own = self._lu.solve(np.concatenate([np.zeros(10 * self._n), slab_load.ravel()]))
+        own = [(rows @ self._own).reshape(W, 2, 3) for rows in (value, slope)]
+        self._under_own = np.concatenate([*own, np.zeros((W, 2, 3))], axis=2)
 
     def under_wheels(self, force: Reals) -> Reals:
         """Rail motion under the wheels.
@@ -107,8 +112,9 @@ class SteadyTrack:
             w, v, theta_x, their slopes, their (zero) rates at constant s, shape (B, W, 2, 9).
         """
         shape = self._compliance.shape[:3]
-        under: Reals = force.reshape(len(force), -1) @ self._compliance.reshape(np.prod(shape), -1).T
-        return under.reshape(len(force), *shape)
+        moved = force.reshape(len(force), -1) @ self._compliance.reshape(np.prod(shape), -1).T
+        under: Reals = moved.reshape(len(force), *shape) + self._under_own
+        return under
 
     def motion(self, force: Reals) -> tuple[Reals, Reals, Reals]:
         """Generalised coordinates under wheel forces.
@@ -123,9 +129,50 @@ class SteadyTrack:
 
     def respond(self, load: Reals) -> tuple[Reals, Reals, Reals]:
         """As :meth:`motion`, under generalised forces on all unknowns."""
-        q, n = self._lu.solve(load), self._n
+        q, n = self._own + self._lu.solve(load), self._n
         rails = q[: 10 * n].reshape(2, 5 * n)
         return rails[:, : 2 * n], rails[:, 2 * n :], q[10 * n :].reshape(self._slabs, -1)
+
+
+def track_stiffness(
+    operators: RailOperators,
+    fastening: Fastening,
+    seats: SeatsInWindow,
+    slabs: Sequence[SlabMatrices],
+    beds: Sequence[Reals],
+    V: float,
+) -> sp.csc_array:
+    """Stiffness of rails, fastenings and slabs, unknowns as in :class:`SteadyTrack`.
+
+    Args:
+        operators: Rail and trial functions.
+        fastening: Sound fastening.
+        seats: Those in the window.
+        slabs: Slabs under it.
+        beds: Stiffness of the bed under each, shape (dofs, dofs).
+        V: Speed [m/s].
+    """
+    stretch, flow, stiffness, damping = _springs(operators, fastening, seats, slabs)
+    rail = (operators.vertical(V)[2], operators.lateral(V)[2])
+    plates = [sp.csr_array(slab.K_plate + bed) for slab, bed in zip(slabs, beds, strict=True)]
+    pull = sp.diags_array(stiffness) @ stretch - V * sp.diags_array(damping) @ flow
+    return sp.csc_array(sp.block_diag([*rail, *rail, *plates], format="csc") + stretch.T @ pull)
+
+
+def vertical_stretch(operators: RailOperators, seats: SeatsInWindow, slabs: Sequence[SlabMatrices]) -> sp.csr_array:
+    """Rows that give the vertical stretch of every fastening, rail less slab, left ones first, shape (2 k, unknowns).
+
+    Args:
+        operators: Rail and trial functions.
+        seats: Fastenings.
+        slabs: Slabs under them.
+    """
+    n, w = operators.functions.count, operators.under(seats.s, 0, seats.length)[0]
+    sides = [
+        sp.hstack([_on_side(side, w, None, n), -_slab_rows(seats, slabs, side, 0, operators.rail.half_base)])
+        for side in range(2)
+    ]
+    return sp.csr_array(sp.vstack(sides))
 
 
 def _on_side(side: int, vertical: sp.csr_array | None, lateral: sp.csr_array | None, n: int) -> sp.csr_array:
