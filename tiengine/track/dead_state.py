@@ -22,6 +22,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from tiengine.parameters.arrays import Reals
+from tiengine.parameters.errors import InputError
 from tiengine.track.dead_load import RestingSlab, RestingTrack, TrackParts, resting_track, samples
 
 __all__ = ["DeadState", "LaidRail", "SlabsAsTheyAre", "dead_state"]
@@ -30,6 +31,8 @@ REACH = 15.0
 """Metres over which a slab feels its neighbours: fifteen decay lengths of a rail on its fastenings."""
 TOGETHER = 20
 """Most slabs whose state is sought at once."""
+MOST_STATES = 2000
+"""Of different slabs; each takes a tenth of a second and 10 kB."""
 
 
 class SlabsAsTheyAre(Protocol):
@@ -121,7 +124,7 @@ def dead_state(parts: TrackParts, slabs: SlabsAsTheyAre, count: int) -> DeadStat
         count: Slabs of the run.
 
     Raises:
-        InputError: No state of rest was found.
+        InputError: Too many slabs differ, or no state of rest was found.
     """
     around = int(np.ceil(REACH / parts.slab.pitch))
     sound = slabs.resting(None)
@@ -130,6 +133,12 @@ def dead_state(parts: TrackParts, slabs: SlabsAsTheyAre, count: int) -> DeadStat
     kinds = [slabs.kind(min(max(i, 0), count - 1)) for i in range(-around, count + around)]
     neighbourhoods = [tuple(kinds[i : i + 2 * around + 1]) for i in range(count)]
     number: dict[tuple[Hashable, ...], int] = {(None,) * (2 * around + 1): 0}
+    different = len(set(neighbourhoods))
+    if different > MOST_STATES:
+        raise InputError(
+            f"track.mortar_no_tension = true: {different} slabs of this run differ in what they and their neighbours"
+            f" lie on; must be at most {MOST_STATES}"
+        )
     for first, end in _stretches(neighbourhoods, number):
         row = [slabs.resting(min(max(i, 0), count - 1)) for i in range(first - around, end + around)]
         found = resting_track(parts, row)
