@@ -241,6 +241,10 @@ def test_a_scenario_in_words():
     assert words["Line"] == "straight and level"
     small = dict(scenario_words(load_scenario("small_curve")))
     assert small["Line"] == "curves down to a radius of 350 m, cant up to 100 mm, level"
+    gaps = dict(scenario_words(load_scenario("gap", {"track.slab_warps": [{"gradient": -45.0, "slabs": [3, 5]}]})))
+    assert "2 fastenings of the right rail hanging by 1 mm (seats 230 to 231" in gaps["Defects"]
+    assert "a gap of 0.05 mm under 4.7 m² of slab 21" in gaps["Defects"]
+    assert "slabs 3 to 5 colder at the top by 45 K/m" in gaps["Defects"]
     smooth = dict(scenario_words(load_scenario("smooth", {"ensemble.size": 3, "ensemble.vary": {
         "train.speed_kmh": (100.0, 200.0, 300.0)}})))  # fmt: skip
     assert smooth["Irregularity"] == "none, a smooth track"
