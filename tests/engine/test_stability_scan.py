@@ -23,6 +23,7 @@ from tiengine.engine.stepper import Plan
 from tiengine.engine.time_step import prepare
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
+from tiengine.parameters.presets import preset_names
 from tiengine.scenario.scenario import load_scenario
 
 from .covering import covering
@@ -43,6 +44,10 @@ PRESETS: dict[str, float | None] = {
     "flat": None,
     "gust": None,
     "settlement": 100.0,
+    "gap": 100.0,
+    "warp": None,
+    "unequal_wheels": None,
+    "earthquake": None,
 }
 """Chainages where the march begins [m]: defects and settled ground lie ahead, trains stand in the arcs of curves."""
 SPLINES = covering(
@@ -135,6 +140,10 @@ def assert_steady(name: str, changes: dict[str, object]) -> None:
     """Nothing accepted grows."""
     found = growth(name, words(changes))
     assert found is None or found < GROWTH
+
+
+def test_every_preset_is_scanned():
+    assert set(PRESETS) == set(preset_names("scenarios"))
 
 
 def test_every_combination_is_covered():

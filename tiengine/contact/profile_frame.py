@@ -206,7 +206,7 @@ def _head(points: Reals) -> _Head | None:
     """Where a head's sides are equally deep; None if it is too shallow to tell."""
     y, z = points.T
     top = int(np.argmin(z))
-    level = min(HEAD_LEVEL, z[0] - z[top], z[-1] - z[top])
+    level = (1.0 - 1e-9) * min(HEAD_LEVEL, z[0] - z[top], z[-1] - z[top])  # both ends are as deep, rounded or not
     if level < SHALLOW:
         return None
     inner = np.flatnonzero(z[: top + 1] >= z[top] + level)[-1]

@@ -153,7 +153,9 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
     else:
         path = find_preset("scenarios", str(source), called="scenario")
         tables = load_toml(path)
-        folder = None if path.parent == library_folder("scenarios") else path.parent  # a built-in one names no files
+        folder = path.parent
+        if folder == library_folder("scenarios"):  # its own files lie there, those of the overrides do not
+            tables, folder = absolute_files(tables, folder), None
         tables.setdefault("name", path.stem)
     tables = absolute_files(apply_overrides(tables, overrides, Scenario), folder)
     scenario = build(Scenario, tables)
