@@ -16,6 +16,7 @@ STATE = {
     "force": "local contact forces of the wheels, where the next solve starts",
     "wheelset_force": "contact forces on the wheelsets",
     "rail_force": "contact forces on the rails",
+    "omitted": "omitted sines at the seats: their motion and that of the last steps",
     "rail": "spline coefficients of the rails, their forces and sweeps",
     "seat": "forces of the seats in the rails' lanes",
     "slab": "coordinates of the slabs, their loads and sweeps",

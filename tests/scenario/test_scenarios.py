@@ -10,6 +10,7 @@ from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation import simulate
+from tiengine.track.splines import Splines
 from tiengine.vehicle.train import static_wheel_loads
 
 from ..reference.stepping import KMH, model_of, run_steps, scenario
@@ -262,3 +263,19 @@ def test_the_trial_tells_what_blows_up(modes, dt, passes, damping, stable):
         and np.abs(run.vertical).max() < 4.0 * static_wheel_loads(model.ingredients.train).max()
     )
     assert bounded == stable
+
+
+@pytest.mark.parametrize(
+    "defect",
+    [
+        'track.failed_fastenings=[{rail="left", seats=[100, 102], factor=0.0}]',
+        "track.mortar_voids=[{slab=12, x=[0.0, 1.0], y=[-1.0, 1.0], factor=0.0}]",
+    ],
+)
+def test_knots_are_closer_where_the_track_has_defects(defect: str) -> None:
+    """The splines of a defective track, and those of the sound one as before."""
+    sound, defective = (load_scenario("default", overrides).trial_functions for overrides in ([], [defect]))
+    assert isinstance(sound, Splines)
+    assert isinstance(defective, Splines)
+    assert np.diff(sound.knots).max() > 0.8
+    assert np.diff(defective.knots).max() <= 0.5 + 1e-9

@@ -26,7 +26,7 @@ def asked(distance, g):
 @pytest.mark.parametrize("cars", [1, 3, 8, 16])
 @pytest.mark.parametrize("grading", [Grading(), Grading(finest=0.1, near=1.0, growth=0.1, coarsest=0.5)])
 def test_spacing(cars, grading):
-    """Nowhere coarser than asked; finer by no more than one span in a stretch between two wheels."""
+    """Nowhere coarser than asked; finer by no more than one span in a stretch between two wheels, or far from them."""
     wheels, length = train(cars)
     knots = graded_knots(length, wheels, grading)
     h, middle = np.diff(knots), (knots[1:] + knots[:-1]) / 2.0
@@ -34,7 +34,11 @@ def test_spacing(cars, grading):
     size = asked(distance, grading)
     # a span takes the mean of one over the spacing; across the corners of the rule it differs from that at its middle
     assert np.all(h < 1.03 * size)
-    assert np.all(h > 0.85 * size)
+    far = (middle < wheels[0] - 5.0) | (
+        middle > wheels[-1] + 5.0
+    )  # three spans or more take what is missing to the end
+    assert np.all(h[~far] > 0.85 * size[~far])
+    assert np.all(h[far] > 2.0 / 3.0 * size[far])
     assert h.min() > 0.85 * grading.finest
     assert knots[0] == 0.0
     assert knots[-1] == length
@@ -100,3 +104,19 @@ def test_wheels_outside(wheels):
 def test_grading_out_of_order():
     with pytest.raises(InputError, match="must not be below"):
         build(Grading, {"finest": 0.5, "coarsest": 0.2}, "grading")
+
+
+def test_at_defects() -> None:
+    """A track with defects has closer knots far from the wheels, never closer than the finest, never coarser."""
+    assert Grading().at_defects().coarsest == 0.5
+    assert Grading(coarsest=0.3).at_defects().coarsest == 0.3
+    assert Grading(finest=0.6).at_defects().coarsest == 0.6
+    assert Grading().at_defects().finest == Grading().finest
+
+
+@pytest.mark.parametrize("length", [38.0, 44.0, 60.3])
+def test_knots_near_the_wheels_do_not_depend_on_the_window(length):
+    """Windows that reach beyond the graded zone, 5.3 m, have the same knots in it."""
+    wheels = np.array([0.0, 2.5, 17.5, 20.0])
+    near = [k[np.abs(k) < 15.2] for k in (graded_knots(x, wheels - 10.0 + 0.5 * x) - 0.5 * x for x in (36.0, length))]
+    np.testing.assert_allclose(near[0], near[1], atol=1e-12)

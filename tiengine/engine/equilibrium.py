@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
-from tiengine.engine.steady import Track, steady_track
+from tiengine.engine.steady import Track, put_track, steady_track
 from tiengine.engine.window import window_clock
 from tiengine.kernels import layout as at
 from tiengine.kernels import patches as kernels
@@ -124,12 +124,9 @@ def equilibrium(model: Model, state: State, X: float, V: float, V_rate: float = 
         problem = _Problem(model, track, V, V_rate, given)
         y = problem.solve()
     x, rates, rail_force = problem.split(y[None])
-    vertical, lateral, slabs = track.motion(rail_force[0])
     state.put(DISPLACEMENT, "vehicles", x[0])
     state.put(VELOCITY, "vehicles", problem.spread(rates[0]))
-    state.put(DISPLACEMENT, "vertical", vertical)
-    state.put(DISPLACEMENT, "lateral", lateral)
-    state.put(DISPLACEMENT, "slabs", slabs)
+    put_track(track, state, rail_force[0])
     forces = problem.contact(y[None])
     state.put_contact(forces.contact, forces.local, forces.wheelset, forces.rail)
 

@@ -29,6 +29,7 @@ class Scratch:
             shape (2, B, slots, 5, n).
         slab_force: Forces of the seats on the slabs, shape (B, slots, 5, n).
         damped: Acceleration of slabs, then trains, by their own damping, shape (columns,).
+        sines_under: w, v, theta_x of these by the sines alone, shape (B, W, 2, 3); used where omitted sines are added.
         rail_predicted: Rails under the wheels at the predictors: w, v, theta_x, slopes, rates, shape (B, W, 2, 9).
     """
 
@@ -41,6 +42,7 @@ class Scratch:
     slab_pull: NDArray[np.float64]
     slab_force: NDArray[np.float64]
     damped: NDArray[np.float64]
+    sines_under: NDArray[np.float64]
     rail_predicted: NDArray[np.float64]
 
     @classmethod
@@ -59,5 +61,6 @@ class Scratch:
             slab_pull=np.zeros((2, B, slots, 5, per_slab)),
             slab_force=np.zeros((B, slots, 5, per_slab)),
             damped=np.zeros(B * (slots * dofs + vehicle)),
+            sines_under=np.zeros((B, W, 2, 3)),
             rail_predicted=np.zeros((B, W, 2, 9)),
         )

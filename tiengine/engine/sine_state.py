@@ -32,6 +32,8 @@ class SineState(State):
         seat_scale: Factors of the fastenings in the window, shape (B, seats, 2).
         design: Design of the slab in each slot, shape (B, slots).
         seat_force: F_V, F_L and roll moment M_b - a F_L of the seats on the rails, shape (B, 2, 3, seats).
+        omitted: Motion of the sines left out at the seats, now and at the ends of the last two steps, shape
+            (B, 2, 3, seats, 3); no seats if they are not added there.
         pressure: Largest and smallest mortar pressure of each slab [Pa], shape (B, slots, 2).
         contact, force, wheelset_force, rail_force: Contact; ``force`` starts the next solve.
         iterations: Most Newton iterations of each wheelset since the last reset, shape (B, W).
@@ -43,6 +45,7 @@ class SineState(State):
     seat_scale: NDArray[np.float64]
     design: NDArray[np.int32]
     seat_force: NDArray[np.float64]
+    omitted: NDArray[np.float64]
     pressure: NDArray[np.float64]
     contact: NDArray[np.float64]
     force: NDArray[np.float64]
@@ -74,6 +77,7 @@ class SineState(State):
             seat_scale=np.ones((B, seats, 2)),
             design=np.zeros((B, slots), dtype=np.int32),
             seat_force=np.zeros((B, 2, 3, seats)),
+            omitted=np.zeros((B, 2, 3, 0 if model.omitted is None else seats, 3)),
             pressure=np.zeros((B, slots, 2)),
             contact=_first_contact(B, W, rows),
             force=np.zeros((B, W, rows, 4)),
@@ -155,7 +159,7 @@ class SineState(State):
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """All arrays, by name."""
         values = {each.name: getattr(self, each.name) for each in fields(self)}
-        return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+        return {name: value for name, value in values.items() if isinstance(value, np.ndarray) and value.size}
 
     def view(self, row: int, block: str) -> NDArray[np.float64]:
         """One block of one row: vertical (B, 2, 2N), lateral (B, 2, 3N), slabs (B, slots, dofs), vehicles (B, n)."""
@@ -176,7 +180,7 @@ class SineState(State):
         for row in ROWS.values():
             for block in self._blocks:
                 self.view(row, block)[train] = 0.0
-        for forces in (self.seat_force, self.pressure, self.force, self.wheelset_force, self.rail_force):
+        for forces in (self.seat_force, self.omitted, self.pressure, self.force, self.wheelset_force, self.rail_force):
             forces[train] = 0.0
         self.contact[train] = _first_contact(1, *self.contact.shape[1:3])[0]
 
@@ -185,6 +189,8 @@ class SineState(State):
         ingredients = self.model.ingredients
         if first_seat != self.first_seat:
             self.seat_scale[:] = ingredients.seat_factors(first_seat, self.seat_scale.shape[1])
+            if self.omitted.size and self.first_seat >= 0:
+                self._shift_seats(first_seat - self.first_seat)
             self.first_seat = first_seat
         if first_slab != self.first_slab:
             slots = self.design.shape[1]
@@ -195,6 +201,13 @@ class SineState(State):
                 for row in ROWS.values():
                     self.view(row, "slabs")[:, slot] = 0.0
             self.first_slab = first_slab
+
+    def _shift_seats(self, count: int) -> None:
+        """Let so many seats leave at the rear: what is known of the others stays with them."""
+        for values in (self.seat_force, self.omitted):
+            seats = values.shape[3]
+            values[:, :, :, : max(seats - count, 0)] = values[:, :, :, count:].copy()
+            values[:, :, :, max(seats - count, 0) :] = 0.0
 
 
 def _first_contact(B: int, W: int, rows: int) -> NDArray[np.float64]:

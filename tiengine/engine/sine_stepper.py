@@ -18,7 +18,9 @@ from tiengine.engine.scratch import Scratch
 from tiengine.engine.sine_state import SineState
 from tiengine.engine.stepper import Call, Stage, Stepper
 from tiengine.kernels import layout as at
+from tiengine.kernels import omitted_modes
 from tiengine.kernels import step as kernels
+from tiengine.model.omitted_tables import OmittedTables
 from tiengine.model.sine_model import SineModel
 from tiengine.parameters.arrays import Reals
 
@@ -81,6 +83,8 @@ class SineStepper(Stepper):
         yield from self._linear_forces()
         for number, tick in enumerate(self._tick):
             yield from self._motion_at_seats(number)
+            if self.model.omitted is not None:
+                yield "seats", self._bind_omitted(tick, self.model.omitted)
             if self._explicit_bed:
                 yield "mortar", self._bind_mortar(number)
             yield "forces and contact", self._bind_forces(tick, number)
@@ -173,6 +177,14 @@ class SineStepper(Stepper):
             k.rail_factor,
             k.slab_factor,
         )
+
+    def _bind_omitted(self, tick: NDArray[np.int32], tables: OmittedTables) -> Launch:
+        m, s, k = self.model, self.state, self.scratch
+        return self._launch(
+            omitted_modes.add_omitted_modes, tick, m.dims, m.constants, self.chunk.clock, tables.by_wheel,
+            tables.by_seat, tables.by_place, tables.wheel_s, s.seat_scale, k.slab_pull, s.seat_force, s.rail_force,
+            s.omitted, k.sines_under, k.rail_pull, k.rail_predicted,
+        )  # fmt: skip
 
     def _bind_forces(self, tick: NDArray[np.int32], number: int) -> Launch:
         m, s, k, b, chunk = self.model, self.state, self.scratch, self.model.blocks, self.chunk

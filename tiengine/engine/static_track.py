@@ -18,7 +18,7 @@ from tiengine.model.sine_model import SineModel
 from tiengine.parameters.arrays import Reals
 from tiengine.track.seat_points import mean_cosine
 
-__all__ = ["StaticTrack"]
+__all__ = ["Springs", "StaticTrack", "seat_springs"]
 
 
 class StaticTrack:
@@ -40,7 +40,7 @@ class StaticTrack:
         K = la.block_diag(rail, rail)
         self._slabs: list[tuple[int, tuple[NDArray[np.float64], NDArray[np.int32]], NDArray[np.float64]]] = []
         slots = model.ingredients.slots
-        for slab, springs in self._springs(state, first_seat_s, train).items():
+        for slab, springs in seat_springs(model, state, first_seat_s, V, train).items():
             K += springs.test.T @ springs.pull
             if slab >= state.first_slab + slots:
                 continue  # beyond the modelled slabs the ground is rigid
@@ -113,33 +113,40 @@ class StaticTrack:
         rails, n = q.reshape(2, -1), self.model.ingredients.modes
         return rails[:, : 2 * n], rails[:, 2 * n :], slabs
 
-    def _springs(self, state: SineState, s0: float, train: int) -> dict[int, _Springs]:
-        """Springs of the seats in the window, by slab."""
-        g = self.model.ingredients
-        d, per_slab = g.slab.fastening_pitch, g.slab.fastenings
-        j = np.arange(state.seat_scale.shape[1])
-        s = np.asarray(s0 + j * d, dtype=np.float64)
-        j = j[s < g.length]
-        mean = mean_cosine(self.model.window.wave_numbers, g.fastening.length)
-        phi, slope = mean * self.model.window.shape(s[j]), mean * self.model.window.shape_slope(s[j])
-        slab, seat = np.divmod(state.first_seat + j, per_slab)
-        found = {}
-        for k in np.unique(slab):
-            here = slab == k
-            found[int(k)] = _slab_springs(
-                self.model, seat[here], state.seat_scale[train, j[here]], phi[here], -self.V * slope[here]
-            )
-        return found
+
+def seat_springs(model: SineModel, state: SineState, s0: float, V: float, train: int) -> dict[int, Springs]:
+    """Springs of the seats in the window, by slab; arguments as for :class:`StaticTrack`."""
+    g = model.ingredients
+    d, per_slab = g.slab.fastening_pitch, g.slab.fastenings
+    j = np.arange(state.seat_scale.shape[1])
+    s = np.asarray(s0 + j * d, dtype=np.float64)
+    j = j[s < g.length]
+    mean = mean_cosine(model.window.wave_numbers, g.fastening.length)
+    phi, slope = mean * model.window.shape(s[j]), mean * model.window.shape_slope(s[j])
+    slab, seat = np.divmod(state.first_seat + j, per_slab)
+    found = {}
+    for k in np.unique(slab):
+        here = slab == k
+        scale = state.seat_scale[train, j[here]]
+        found[int(k)] = _slab_springs(model, seat[here], scale, phi[here], -V * slope[here])
+    return found
 
 
 @dataclass(frozen=True, eq=False)
-class _Springs:
-    """Springs between rails and one slab: force = pull . rails - stiffness (slab . slab's motion), along ``test``."""
+class Springs:
+    """Springs between rails and one slab: force = pull . rails - stiffness (slab . slab's motion), along ``test``.
 
-    test: NDArray[np.float64]  # (m, 10 N)
-    pull: NDArray[np.float64]  # (m, 10 N)
-    slab: NDArray[np.float64]  # (m, dofs)
-    stiffness: NDArray[np.float64]  # (m,)
+    Attributes:
+        test, pull: Rows over the rails' coordinates, shape (m, 10 N).
+        slab: Rows over the slab's, shape (m, dofs).
+        stiffness, damping: k and c, shape (m,).
+    """
+
+    test: NDArray[np.float64]
+    pull: NDArray[np.float64]
+    slab: NDArray[np.float64]
+    stiffness: NDArray[np.float64]
+    damping: NDArray[np.float64]
 
 
 def _slab_springs(
@@ -148,7 +155,7 @@ def _slab_springs(
     scale: NDArray[np.float64],
     phi: NDArray[np.float64],
     rate: NDArray[np.float64],
-) -> _Springs:
+) -> Springs:
     """Vertical, rolling and lateral spring of each fastening (MODEL §3).
 
     Args:
@@ -181,4 +188,5 @@ def _slab_springs(
             slab[i, side, 2, -2:] = 1.0, design.seat_x[j]
     m = k.size
     shapes, rates = test.reshape(m, -1), flow.reshape(m, -1)
-    return _Springs(shapes, k.reshape(m, 1) * shapes + c.reshape(m, 1) * rates, slab.reshape(m, -1), k.ravel())
+    pull = k.reshape(m, 1) * shapes + c.reshape(m, 1) * rates
+    return Springs(shapes, pull, slab.reshape(m, -1), k.ravel(), c.ravel())

@@ -6,9 +6,10 @@ from typing import Protocol
 
 import numpy as np
 
+from tiengine.engine.compliant_track import CompliantTrack
 from tiengine.engine.sine_state import SineState
 from tiengine.engine.start_on_bed import BedAtStart
-from tiengine.engine.state import State
+from tiengine.engine.state import DISPLACEMENT, State
 from tiengine.engine.static_track import StaticTrack
 from tiengine.kernels import layout as at
 from tiengine.model.constant_data import Model
@@ -17,7 +18,7 @@ from tiengine.parameters.arrays import Flags, Reals
 from tiengine.track.steady_track import RIGID_GROUND, SeatsInWindow, SteadyTrack, track_stiffness
 from tiengine.vehicle.train import static_wheel_loads
 
-__all__ = ["Track", "steady_track"]
+__all__ = ["Track", "put_track", "steady_track"]
 
 
 class Track(Protocol):
@@ -55,8 +56,24 @@ def steady_track(model: Model, state: State, first_seat_s: float, V: float) -> T
         V: Speed [m/s].
     """
     if isinstance(model, SineModel) and isinstance(state, SineState):
+        if model.omitted is not None:
+            return CompliantTrack(model, model.omitted, state, first_seat_s, V)
         return StaticTrack(model, state, first_seat_s, V)
     return SplineTrack(model, state, first_seat_s, V)
+
+
+def put_track(track: Track, state: State, force: Reals) -> None:
+    """Put rails, slabs and seats of all trains of a state into steady motion.
+
+    Args:
+        track: The track under the state's window.
+        state: Written.
+        force: Forces on w, v, theta_x at the wheels, shape (W, 2, 3).
+    """
+    for name, values in zip(("vertical", "lateral", "slabs"), track.motion(force), strict=True):
+        state.put(DISPLACEMENT, name, values)
+    if isinstance(track, CompliantTrack) and isinstance(state, SineState):
+        track.put_seats(state, force)
 
 
 class SplineTrack:

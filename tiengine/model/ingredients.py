@@ -71,6 +71,7 @@ class Ingredients:
         explicit_mortar: Treat the bed explicitly.
         grading: Knots of the splines; None for sines.
         local_compliance: Add the static compliance that the trial functions lack under the wheels.
+        static_compliance: Add it at the seats, and between wheels and seats, as well; sines only.
         absorbing_zone: Length of the zones at the window's ends with additional springs to the ground [m]; 0 for none.
         shaped: Whether rails have shapes or wheels are out of round.
         out_of_round: Tables of wheels out of round; None where all are round.
@@ -98,6 +99,7 @@ class Ingredients:
     cover: bool = True
     explicit_mortar: bool = False
     local_compliance: bool = False
+    static_compliance: bool = False
     absorbing_zone: float = 0.0
     shaped: bool = False
     out_of_round: WheelTables | None = None

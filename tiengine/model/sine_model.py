@@ -13,6 +13,7 @@ from tiengine.model.constant_data import MassAndStiffness, Model, shared_arrays,
 from tiengine.model.implicit_seats import smeared_fastening
 from tiengine.model.ingredients import Ingredients
 from tiengine.model.newmark import inverse
+from tiengine.model.omitted_tables import OmittedTables
 from tiengine.model.speed_blocks import Blocks
 from tiengine.parameters.arrays import Reals
 from tiengine.track.fastening import seat_tables
@@ -40,6 +41,7 @@ class SineModel(Model):
         slab_inverse: Inverses of the slab blocks, transposed, shape (designs, dofs, dofs).
         wheel_shape: sin(k_i s) and its slope under the wheels, shape (2, W, N).
         blocks: Inverses that depend on the speed.
+        omitted: Compliance of the sines left out, if it is added at the seats.
     """
 
     window: RailWindow
@@ -53,6 +55,7 @@ class SineModel(Model):
     slab_inverse: Reals
     wheel_shape: Reals
     blocks: Blocks
+    omitted: OmittedTables | None = None
 
     @property
     def rails_at_rest(self) -> tuple[MassAndStiffness, MassAndStiffness]:
@@ -88,6 +91,7 @@ def build_sine_model(ingredients: Ingredients, V: float) -> SineModel:
         **_slab_products(ingredients),
         wheel_shape=np.stack([window.shape(wheel_s), window.shape_slope(wheel_s)]),
         blocks=Blocks.empty(ingredients.modes, len(wheel_s), ingredients.train.n),
+        omitted=OmittedTables.of(ingredients) if ingredients.static_compliance else None,
     )
     model.refactor(V)
     return model

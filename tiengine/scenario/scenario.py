@@ -34,7 +34,7 @@ from tiengine.scenario.shape_checks import check_shapes
 from tiengine.scenario.tables import BlowingWind, Contact, Numerics, Output, Track, Train
 from tiengine.track.defects import check_defects
 from tiengine.track.fastening import check_baseplate
-from tiengine.track.knots import graded_knots
+from tiengine.track.knots import Grading, graded_knots
 from tiengine.track.seat_points import seat_points
 from tiengine.track.sines import Sines
 from tiengine.track.slab_warp import check_slab_warps
@@ -116,6 +116,12 @@ class Scenario(Params):
         """Centre of the first vehicle from the window's rear end [m]: the wheels stand in its middle."""
         return centre_in_window(self.window_length, self.parts.wheelset_positions)
 
+    @property
+    def grading(self) -> Grading:
+        """Grading of the splines' knots on this track."""
+        defects = self.track.failed_fastenings or self.track.mortar_voids
+        return self.numerics.knots.at_defects() if defects else self.numerics.knots
+
     @cached_property
     def trial_functions(self) -> Splines | Sines:
         """Trial functions of the rails."""
@@ -123,7 +129,7 @@ class Scenario(Params):
         if self.numerics.trial_functions == "sines":
             return Sines(length, self.numerics.modes(length))
         wheels = self.centre_in_window + self.parts.wheelset_positions
-        return Splines(graded_knots(length, wheels, self.numerics.knots))
+        return Splines(graded_knots(length, wheels, self.grading))
 
 
 def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Overrides = ()) -> Scenario:
@@ -319,6 +325,11 @@ def _check_trial_functions(scenario: Scenario) -> None:
         raise InputError(
             f"numerics.threads = {numerics.threads}: must be 1 with splines, whose step has one thread; several trains"
             " share the cores by worker processes (--workers)"
+        )
+    if numerics.truncation == "static" and not sines:
+        raise InputError(
+            'numerics.truncation = "static": must be "local" or "none" with splines, which lack nothing between wheels'
+            " and seats that would count"
         )
     most, fewer = (MOST_MODES, "numerics.modes_per_metre") if sines else (MOST_KNOTS, "density of numerics.knots")
     count = numerics.modes(window) if sines else int(window / numerics.knots.finest)

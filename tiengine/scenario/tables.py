@@ -252,8 +252,11 @@ class Numerics(Params):
         Field(description="part of the integration that holds the mortar bed; results are the same"),
     ] = "implicit"
     truncation: Annotated[
-        Literal["none", "local"],
-        Field(description="whether the static compliance that the trial functions lack is added under the wheels"),
+        Literal["none", "local", "static"],
+        Field(
+            description="static compliance that the trial functions lack: left out, added under the wheels, or"
+            ' ("static", sines only) added under the wheels, at the seats and between them'
+        ),
     ] = "local"
     absorbing_zone: Annotated[float, Q("m", "length at either end of the window, see above", ge=0)] = 0.0
     slab_count: Annotated[

@@ -12,6 +12,7 @@ from functools import cache
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tiengine.engine.chunk import Chunk
@@ -30,6 +31,8 @@ from validation.paper.comparison import ALL_MODES, PER_METRE, difference
 Kind = Literal["sines", "splines"]
 SCENARIO = {"sines": "paper", "splines": "default"}
 DENSITY = {"sines": PER_METRE, "splines": 6.5}  # of the full-length model
+PASSES: dict[Kind, tuple[str, ...]] = {"sines": (), "splines": ("numerics.passes=4",)}
+"""Passes of the full-length model over defects: two lag by 0.18 % of the peak where a wheel lands."""
 
 STEP, FINE = 1e-4, 5e-5  # a wheel lifts off over the failed fastenings, and its impact needs a finer step
 PITCH, SEATS_PER_SLAB = 5.67, 9
@@ -70,7 +73,7 @@ def _full(kind: Kind) -> Forces:
 def _over_defects(kind: Kind, direction: str) -> float:
     """Largest difference of the wheel forces over the peak [%]."""
     settings = _settings(kind, 36.0, FINE, SMOOTH, *DEFECTS)
-    whole = full_length(SCENARIO[kind], _rail(kind, FINE), *settings)
+    whole = full_length(SCENARIO[kind], _rail(kind, FINE), *settings, *PASSES[kind])
     return difference(whole, simulate(SCENARIO[kind], *settings), direction).largest
 
 
@@ -80,18 +83,41 @@ def _ripple(run: Forces) -> float:
     return float(run.vertical[last].std(axis=0).mean())
 
 
-def _at_entries(run: Forces, length: float) -> float:
-    """Largest second difference of any wheel force within a millisecond of a slab's entry into a window [N]."""
-    forces = np.concatenate([run.vertical, run.lateral], axis=2).reshape(len(run.time), -1)
-    kink = np.abs(np.diff(forces, n=2, axis=0)).max(axis=1)
+def _kinks(run: Forces) -> Reals:
+    """Largest second difference of any wheel force at every step, shape (steps - 2,) [N]."""
+    kinks: Reals = np.abs(np.diff(_all_forces(run), n=2, axis=0)).max(axis=1)
+    return kinks
+
+
+def _all_forces(run: Forces) -> Reals:
+    return np.concatenate([run.vertical, run.lateral], axis=2).reshape(len(run.time), -1)
+
+
+def _near_entries(run: Forces, length: float) -> NDArray[np.bool_]:
+    """Whether a slab has entered a window of this length [m] within a millisecond, shape (steps - 2,)."""
     slab = np.floor((run.position - 0.5 * length) / PITCH)  # at the window's rear end: one slab leaves as one enters
-    entered = np.flatnonzero(np.diff(slab))
-    entered = entered[run.position[entered] > CALM]
-    return float(max(kink[k - 1 : k + EVENT].max() for k in entered))
+    near = np.zeros(len(slab) - 2, dtype=np.bool_)
+    for k in np.flatnonzero(np.diff(slab)):
+        near[max(k - 1, 0) : k + EVENT] = True
+    return near & (run.position[1:-1] > CALM)
 
 
-def _scenario(kind: Kind) -> Scenario:
-    return load_scenario(SCENARIO[kind], _settings(kind, 36.0, FINE, SMOOTH, *DEFECTS))
+def _at_entries(run: Forces, length: float) -> float:
+    """Largest kink within a millisecond of a slab's entry [N]."""
+    return float(_kinks(run)[_near_entries(run, length)].max())
+
+
+@cache
+def _between_windows() -> tuple[float, float]:
+    """Largest kink in the difference of two windows of splines, near slabs' entries and at other times [N]."""
+    first, second = (_window("splines", length) for length in ENTRIES)
+    kinks = np.abs(np.diff(_all_forces(first) - _all_forces(second), n=2, axis=0)).max(axis=1)
+    near = _near_entries(first, ENTRIES[0]) | _near_entries(first, ENTRIES[1])
+    return float(kinks[near].max()), float(kinks[~near & (first.position[1:-1] > CALM)].max())
+
+
+def _scenario(kind: Kind, *overrides: str) -> Scenario:
+    return load_scenario(SCENARIO[kind], _settings(kind, 36.0, FINE, SMOOTH, *DEFECTS, *overrides))
 
 
 @cache
@@ -120,7 +146,7 @@ def _seats_of_window(kind: Kind) -> Reals:
 @cache
 def _seats_of_full(kind: Kind) -> Reals:
     """Vertical force of the chosen seats in the full-length model."""
-    scenario = _scenario(kind)
+    scenario = _scenario(kind, *PASSES[kind])
     steps = len(_seats_of_window(kind))
     stepper = prepare_full(scenario, _rail(kind, FINE), steps, 1)
     load(stepper, scenario, make_irregularity(scenario.irregularity, 0.0), float(scenario.train.start), 1e3)
@@ -200,12 +226,14 @@ CASES = (
     Case(
         name="splines-slab-entry",
         kind="full length",
-        quantity="kinks within 1 ms of a slab's entry, as above, splines less those of whole rails [N], 36 and 44 m",
-        source=DENSE,
-        reference=lambda: [_at_entries(_full("splines"), length) for length in ENTRIES],
-        atol=0.5,
-        why="7e-6 of a wheel load; the two kinds of trial functions differ in what they carry of the seats",
-        compute=lambda: [_at_entries(_window("splines", length), length) for length in ENTRIES],
+        quantity="kinks within 1 ms of a slab's entry (largest second difference at 1e-4 s) in the difference of the"
+        " forces in windows of 36 and 44 m, splines, smooth track [N]",
+        source="the same difference at all other times, when seats enter only",
+        reference=lambda: _between_windows()[1],
+        rule="at most",
+        why="7 N, 1e-4 of a wheel load, by seats at the windows' ends; the seats' kinks under the wheels, 21 N with"
+        " splines and 36 N with 6.5 sines a metre, cancel",
+        compute=lambda: _between_windows()[0],
         quick=False,
     ),
     *(

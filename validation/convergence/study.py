@@ -5,7 +5,7 @@ varied at a time (a star about the default: the errors hardly depend on the othe
 refined. References are the engine's own finest runs. Statistics omit the first 40 m. Norms, over all eight wheels, of
 the vertical or lateral force's difference:
 
-  largest   largest, over the largest force, while all wheels are on the rails and for 1.5 m after they landed
+  largest   largest, over the largest force, while all wheels are on the rails, not for 2 m after they landed
   p99       exceeded in 1 % of the time, over the largest force, everything included
   rms       root mean square, over the force's standard deviation, everything included
   landing   largest, over the largest force, everything included
@@ -42,7 +42,7 @@ __all__ = [
 ]  # fmt: skip
 
 START, DISTANCE, RUN_IN = 40.0, 150.0, 40.0  # m; the longest window ends at 70 m then, its rear at 10 m
-BEFORE_LIFT, AFTER_LANDING = 0.3, 1.5  # m; errors do not depend on more
+BEFORE_LIFT, AFTER_LANDING = 0.3, 2.0  # m; errors do not depend on more
 DIRECTIONS = ("vertical", "lateral")
 QUANTITIES = {"normal": "N", "vertical": "Q", "lateral": "Y"}
 SPAN = 20.0  # m between the outer wheels
@@ -195,6 +195,7 @@ PATH = {
 _FINE = Setting(dt=1e-4)
 """About which trial functions are varied: the error of the step would hide those of fine knots."""
 _FINEST_KNOTS = replace(_FINE, density=3.0, passes=3)
+_PAPER_STATIC = replace(PAPER, dt=1e-4, truncation="static", passes=3)
 CONVERGED = Setting(dt=5e-5, density=2.0, mesh=(18, 4), window=SPAN + 24.0, passes=3)
 """All settings refined."""
 AXES = {
@@ -286,10 +287,11 @@ CASES = (
             name=f"convergence-mesh-{direction}",
             kind="convergence",
             quantity=f"order in h of the {direction} force's rms error, slab meshes 9 x 2 and 18 x 4",
-            source=f"{AXES['mesh'].finest.label}; ACM element: h^2",
-            reference=2.0,
-            atol=0.5,
-            why="two elements across are not yet in the range of h^2",
+            source=f"{AXES['mesh'].finest.label}; ACM rectangles of one size: h^2 (Lascaux and Lesaint 1975)",
+            reference=1.5,
+            rule="at least",
+            why="h^2 holds for small elements; two across err by more than it tells (beside 36 x 8 over 80 m 44 and 19"
+            " times as much as 18 x 4), so that the order comes out above two, which is no fault",
             compute=lambda direction=direction: _mesh_order(direction),
             quick=False,
         )
@@ -316,6 +318,47 @@ CASES = (
         why="what the default may be off: 8 sines a metre carry two harmonics of the seats only",
         compute=lambda: _bounded(replace(_FINE, functions="sines", density=8.0), _FINEST_KNOTS),
         quick=False,
+    ),
+    Case(
+        name="paper60-static",
+        kind="convergence",
+        quantity="60 sines in 36 m with the static compliance of those left out, seats of 0.15 m, over the peak [%]:"
+        f" {_BOUNDED}",
+        source=f"own run at {_FINEST_KNOTS.label}",
+        reference=(0.5, 0.3, 3.0),
+        rule="at most",
+        why="required bounds of N; Y keeps half of its error, since the waves of torsion and lateral bending left out,"
+        " from 700 Hz on, are not static",
+        compute=lambda: _bounded(
+            replace(_FINE, functions="sines", density=60 / 36, truncation="static"), _FINEST_KNOTS
+        ),
+        quick=False,
+    ),
+    Case(
+        name="paper60-static-points",
+        kind="convergence",
+        quantity=f"the same with point seats as in the source paper: {_BOUNDED}",
+        source="own run with 8 sines a metre and the same compliance, 1e-4 s, 3 passes",
+        reference=(0.5, 0.3, 3.0),
+        rule="at most",
+        why="as with seats of 0.15 m",
+        compute=lambda: _bounded(replace(_PAPER_STATIC, passes=2), replace(_PAPER_STATIC, density=8.0)),
+        quick=False,
+    ),
+    *(
+        Case(
+            name=f"paper60-{truncation}",
+            kind="information",
+            quantity=f'the same with truncation = "{truncation}", seats of 0.15 m: {_BOUNDED}',
+            source=f"own run at {_FINEST_KNOTS.label}",
+            reference=np.full(3, np.nan),
+            why="beside paper60-static",
+            compute=lambda truncation=truncation: _bounded(
+                replace(_FINE, functions="sines", density=60 / 36, truncation=truncation), _FINEST_KNOTS
+            ),
+            quick=False,
+        )
+        for truncation in ("none", "local")
     ),
     Case(
         name="convergence-default",

@@ -93,6 +93,8 @@ def prepare(scenario: Scenario, numerics: FullLength, steps: int, body_rows: int
     for key, given_key in refused:
         if given_key:
             raise InputError(f"{key}: must be left out in the full-length model")
+    if scenario.numerics.truncation == "static":
+        raise InputError('numerics.truncation = "static": must be "local" or "none" in the full-length model')
     if scenario.numerics.start != "equilibrium":
         raise InputError('numerics.start = "zero": must be "equilibrium" in the full-length model')
     if scenario.track.line is not None:
