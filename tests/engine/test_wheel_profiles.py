@@ -158,3 +158,26 @@ def test_exchanged_sides_give_mirrored_forces(make: Any, patches: int):
     assert right[..., ::-1, 0] == pytest.approx(left[..., 0], abs=FOUND)
     assert right[..., ::-1, 1] == pytest.approx(-left[..., 1], abs=FOUND)
     assert np.abs(left[..., 1].sum(axis=-1)).max() > 10.0
+
+
+@pytest.mark.slow
+def test_vehicles_of_one_train_may_have_wheels_of_different_size():
+    """Each rolls on its own radius as in a train of its kind alone: rolling radii within 2 um, spin accordingly.
+
+    The rails carry a neighbour's load 7 m away, and the seats stand elsewhere under the second vehicle.
+    """
+    larger = '{like="CRH380A_v2", geometry={wheel_radius=0.46, half_span_contact=0.7475}}'
+    found = []
+    for vehicles in ('"CRH380A_v2"', larger, f'"CRH380A_v2", {larger}'):
+        run = Run(default_model(f"train.vehicles=[{vehicles}]", V=60.0), 60.0)
+        train = run.model.ingredients.train
+        radius = run.state.wheels.contact[0, :, :2, wr.R_C]  # type: ignore[attr-defined]
+        spin = run.state.part(0, "vehicles")[VELOCITY][train.wheelset_dof[:, PITCH]]
+        wheel = run.advance(20)
+        Q = wheel[..., at.VERTICAL_FORCE].sum(axis=(1, 2))
+        assert Q == pytest.approx(train.gravity.sum(), rel=0.02)  # passing seats excite it by 1 %
+        found.append((radius, spin))
+    (small, slow), (large, fast), (mixed, spin) = found
+    assert mixed == pytest.approx(np.vstack([small, large]), abs=2e-6)
+    assert spin == pytest.approx(np.concatenate([slow, fast]), abs=60.0 * 2e-6 / 0.43**2)
+    assert large.min() > 0.459
