@@ -28,7 +28,7 @@ SEAT = {"name": "c", "on": "fastening", "chainage": 20.0, "side": "right"}
         ([RAIL | {"name": "a b"}], r"gauges\[0\].name = 'a b': must be made of letters, digits, _ and -"),
         ([RAIL | {"name": ""}], r"gauges\[0\].name = '': must be made of"),
         ([RAIL | {"name": "../x"}], r"gauges\[0\].name = '../x': must be made of"),
-        ([RAIL | {"on": "sleeper"}], r"gauges\[0\].on = 'sleeper': must be 'rail', 'slab' or 'fastening'"),
+        ([RAIL | {"on": "sleeper"}], r"gauges\[0\].on = 'sleeper': must be 'rail', 'slab', 'fastening' or 'gap'"),
         ([RAIL | {"chainage": -1.0}], r"gauges\[0\].chainage = -1.0: must be greater than or equal to 0 m"),
         ([RAIL | {"chainage": 1e3}], r"gauges\[0\].chainage = 1000: must be between 0 and 46 m"),
         ([RAIL | {"side": None}], r"gauges\[0\].side: missing; a gauge on a rail needs 'left' or 'right'"),

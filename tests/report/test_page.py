@@ -238,6 +238,10 @@ def test_a_scenario_in_words():
     assert words["Train"] == "CRH380A_v2 with LMA wheels, over 200 m at 350 km/h"
     assert "3 fastenings of the left rail failed (seats 160 to 162, chainage 101.1 to 102.4 m)" in words["Defects"]
     assert "no mortar under 1.6 m² of slab 24" in words["Defects"]
+    gaps = dict(scenario_words(load_scenario("gap", {"track.slab_warps": [{"gradient": -45.0, "slabs": [3, 5]}]})))
+    assert "2 fastenings of the right rail hanging by 1 mm (seats 230 to 231" in gaps["Defects"]
+    assert "a gap of 0.05 mm under 4.7 m² of slab 21" in gaps["Defects"]
+    assert "slabs 3 to 5 colder at the top by 45 K/m" in gaps["Defects"]
     smooth = dict(scenario_words(load_scenario("smooth", {"ensemble.size": 3, "ensemble.vary": {
         "train.speed_kmh": (100.0, 200.0, 300.0)}})))  # fmt: skip
     assert smooth["Irregularity"] == "none, a smooth track"

@@ -68,16 +68,15 @@ def test_a_resumed_run_has_the_same_bits(record, tmp_path):
     assert_same(tmp_path / "whole.h5", path)
 
 
+@pytest.mark.slow
 def test_trains_together_move_as_alone(record):
-    """Two trains on irregular track in one task and each alone: forces to the rounding of other vector lengths."""
-    both = scenario(record, ensemble__size=2)
+    """The second of two trains on irregular track and the same alone: forces to the rounding of other vectors."""
+    both = scenario(record, ensemble__size=2, train__distance=20.0)
     with simulate.run(both) as result:
-        together = [result.wheel(train=i)["vertical_force"] for i in range(2)]
-    for i, expected in enumerate(together):
-        alone = scenario(record, irregularity__seed=both.members[i].irregularity.seed)
-        with simulate.run(alone) as result:
-            found = result.wheel()["vertical_force"]
-        np.testing.assert_allclose(found, expected, atol=1e-3)
+        expected = result.wheel(train=1)["vertical_force"]
+    alone = scenario(record, irregularity__seed=both.members[1].irregularity.seed, train__distance=20.0)
+    with simulate.run(alone) as result:
+        np.testing.assert_allclose(result.wheel()["vertical_force"], expected, atol=1e-3)
 
 
 def test_a_record_that_has_not_begun_changes_nothing(record):

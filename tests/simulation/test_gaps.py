@@ -67,6 +67,21 @@ def test_a_settlement_on_a_bed_without_tension() -> None:
     assert np.ptp(bridged) == pytest.approx(np.ptp(pulled), rel=0.3)
 
 
+@pytest.mark.slow
+def test_trains_together_have_the_bits_of_one_alone() -> None:
+    """Wider vectors, other lanes: nothing else."""
+    found = []
+    for size in (1, 3):
+        changes = [
+            "track.slab_warps=[{gradient=-40, slabs=[10, 16]}]",
+            SEATS.format("gap=2e-4"),
+            f"ensemble.size={size}",
+        ]
+        with run(load_scenario("default", [*BASE, *changes, "irregularity.spectrum='german_low'"])) as result:
+            found.append(np.asarray(result["trains/000/wheel/normal_force"][:]))
+    np.testing.assert_array_equal(*found)
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [

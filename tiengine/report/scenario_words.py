@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tiengine.scenario.scenario import Scenario
     from tiengine.track.defects import FailedFastenings
     from tiengine.track.mortar import MortarVoid
+from tiengine.track.slab_warp import SlabWarp
 
 __all__ = ["scenario_words"]
 
@@ -114,6 +115,8 @@ def _defects(scenario: Scenario) -> Iterator[str]:
         yield _fastenings(row, slab.fastening_pitch)
     for void in scenario.track.mortar_voids:
         yield _void(void)
+    for warp in scenario.track.slab_warps:
+        yield _warp(warp)
 
 
 def _ground(scenario: Scenario) -> Iterator[str]:
@@ -136,6 +139,8 @@ def _fastenings(row: FailedFastenings, pitch: float) -> str:
     first, last = row.seats
     count = last - first + 1
     state = "failed" if row.factor == 0.0 else f"at {100.0 * row.factor:g} % of their stiffness"
+    if row.gap:
+        state = f"hanging by {1e3 * row.gap:g} mm" + ("" if row.factor == 1.0 else f", {state}")
     rails = "both rails" if row.rail == "both" else f"the {row.rail} rail"
     where = f"seat {first}" if count == 1 else f"seats {first} to {last}"
     begin, end = ((seat + 0.5) * pitch for seat in row.seats)
@@ -145,8 +150,15 @@ def _fastenings(row: FailedFastenings, pitch: float) -> str:
 
 def _void(void: MortarVoid) -> str:
     state = "no mortar" if void.factor == 0.0 else f"mortar at {100.0 * void.factor:g} % of its stiffness"
+    if void.gap:
+        state = f"a gap of {1e3 * void.gap:g} mm" + ("" if void.factor == 1.0 else f", {state} below,")
     area = (void.x[1] - void.x[0]) * (void.y[1] - void.y[0])
     return f"{state} under {area:.2g} m² of slab {void.slab} (from its rear edge {void.x[0]:g} to {void.x[1]:g} m)"
+
+
+def _warp(warp: SlabWarp) -> str:
+    which = "all slabs" if warp.slabs is None else f"slabs {warp.slabs[0]} to {warp.slabs[1]}"
+    return f"{which} {'warmer' if warp.gradient > 0.0 else 'colder'} at the top by {abs(warp.gradient):g} K/m"
 
 
 def _numerics(scenario: Scenario) -> str:

@@ -21,7 +21,8 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from tiengine.parameters.arrays import Reals
+from tiengine.parameters.arrays import Ints, Reals
+from tiengine.parameters.errors import InputError
 from tiengine.track.dead_load import RestingSlab, RestingTrack, TrackParts, resting_track, samples
 
 __all__ = ["DeadState", "LaidRail", "SlabsAsTheyAre", "dead_state"]
@@ -30,6 +31,8 @@ REACH = 15.0
 """Metres over which a slab feels its neighbours: fifteen decay lengths of a rail on its fastenings."""
 TOGETHER = 20
 """Most slabs whose state is sought at once."""
+MOST_STATES = 2000
+"""Of different slabs; each takes a tenth of a second and 10 kB."""
 
 
 class SlabsAsTheyAre(Protocol):
@@ -56,7 +59,7 @@ class DeadState:
     """
 
     pitch: float
-    kind: np.ndarray[tuple[int], np.dtype[np.int64]]
+    kind: Ints
     pressure: Reals
     seat_force: Reals
     slabs: Reals
@@ -121,37 +124,58 @@ def dead_state(parts: TrackParts, slabs: SlabsAsTheyAre, count: int) -> DeadStat
         count: Slabs of the run.
 
     Raises:
-        InputError: No state of rest was found.
+        InputError: Too many slabs differ, or no state of rest was found.
     """
     around = int(np.ceil(REACH / parts.slab.pitch))
     sound = slabs.resting(None)
     laid = _cut(parts, resting_track(parts, [sound] * (2 * around + 1)), around)
     states = [(laid[0], laid[1], laid[2], np.zeros_like(laid[3]))]
-    kinds = [slabs.kind(min(max(i, 0), count - 1)) for i in range(-around, count + around)]
-    neighbourhoods = [tuple(kinds[i : i + 2 * around + 1]) for i in range(count)]
-    number: dict[tuple[Hashable, ...], int] = {(None,) * (2 * around + 1): 0}
-    for first, end in _stretches(neighbourhoods, number):
+    kind, first_of = _states_by_slab(slabs, count, around)
+    if len(first_of) > MOST_STATES:
+        raise InputError(
+            f"track.mortar_no_tension = true: {len(first_of)} slabs of this run differ in what they and their"
+            f" neighbours lie on; must be at most {MOST_STATES}"
+        )
+    for first, end in _rows(first_of):
         row = [slabs.resting(min(max(i, 0), count - 1)) for i in range(first - around, end + around)]
         found = resting_track(parts, row)
-        for i in range(first, end):
-            pressure, force, moved, rails = _cut(parts, found, i - first + around)
-            number[neighbourhoods[i]] = len(states)
+        for i in range(around, end - first + around):
+            pressure, force, moved, rails = _cut(parts, found, i)
             states.append((pressure, force, moved, rails - laid[3]))
-    kind = np.array([number[each] for each in neighbourhoods], np.int64)
     return DeadState(parts.slab.pitch, kind, *(np.stack(part) for part in zip(*states, strict=True)))
 
 
-def _stretches(
-    neighbourhoods: Sequence[tuple[Hashable, ...]], known: dict[tuple[Hashable, ...], int]
-) -> list[tuple[int, int]]:
-    """Rows of slabs, first and end, that meet every neighbourhood that is not known yet once."""
-    met, fresh = set(known), []
-    for i, each in enumerate(neighbourhoods):
-        if each not in met:
-            met.add(each)
-            fresh.append(i)
+def _states_by_slab(slabs: SlabsAsTheyAre, count: int, around: int) -> tuple[Ints, list[int]]:
+    """Number the neighbourhoods of the slabs.
+
+    Args:
+        slabs: The slabs.
+        count: Slabs of the run.
+        around: Neighbours on either side that matter.
+
+    Returns:
+        Number of each slab's state, 0 where it and its neighbours are sound, shape (count,), and the slab at which each
+        other one is met first.
+    """
+    number: dict[Hashable, int] = {None: 0}
+    kinds = [number.setdefault(slabs.kind(i), len(number)) for i in range(count)]
+    row = np.pad(np.array(kinds, np.int32), around, mode="edge")
+    width = 2 * around + 1
+    known: dict[bytes, int] = {np.zeros(width, np.int32).tobytes(): 0}
+    states, first_of = np.zeros(count, np.int64), []
+    for i in range(count):
+        near = row[i : i + width].tobytes()
+        if near not in known:
+            known[near] = len(known)
+            first_of.append(i)
+        states[i] = known[near]
+    return states, first_of
+
+
+def _rows(slabs: Sequence[int]) -> list[tuple[int, int]]:
+    """Ascending slabs in rows of neighbours, first and end, none too long to be solved at once."""
     rows: list[tuple[int, int]] = []
-    for i in fresh:
+    for i in slabs:
         if rows and rows[-1][1] == i and i - rows[-1][0] < TOGETHER:
             rows[-1] = (rows[-1][0], i + 1)
         else:
