@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,10 +13,7 @@ from tiengine.engine.state import DISPLACEMENT, VELOCITY, State
 from tiengine.kernels import layout as at
 from tiengine.kernels import wheel_rail as wr
 from tiengine.model.constant_data import Model
-from tiengine.model.from_scenario import ingredients
-from tiengine.model.model import build_model
-from tiengine.scenario.scenario import load_scenario
-from validation.cases.klingel import FREE, cone, round_head, wagon
+from validation.cases.unequal_wheels import free_wagon, rolling
 
 from ..models import V350, Run, default_model, paper_model
 from ..wheelsets import PITCH, ROLL, Wheelsets, Y, Z, scattered
@@ -99,31 +95,6 @@ def test_a_larger_wheel_reaches_deeper_and_runs_ahead(patches: int):
     np.testing.assert_allclose(shift[1] - shift[0], -1e-3 * d * [[-1.0, 1.0]] * np.ones((50, 1)), atol=1e-17)
 
 
-@cache
-def free_wheelsets(slope: float, difference: float, trial_functions: str) -> tuple[Model, State]:
-    """A wagon whose wheelsets steer freely, left wheels larger than right ones, at 30 km/h."""
-    free = wagon(FREE)  # to yaw; across, the car goes with its wheelsets
-    free["spring"] = tuple({**spring, "ky": 1e6} for spring in free["spring"])
-    scenario = load_scenario(
-        {
-            "train": {
-                "vehicles": (free,),
-                "wheel_profile": cone(slope),
-                "wheel_profiles": (
-                    {"side": "left", "radius_difference": 0.5 * difference},
-                    {"side": "right", "radius": 0.43 - 0.5 * difference},
-                ),
-                "speed_kmh": 30.0,
-                "distance": 10.0,
-            },
-            "track": {"rail_profile": round_head(), "friction": 1.0},
-            "numerics": {"trial_functions": trial_functions},
-        }
-    )
-    model = build_model(ingredients(scenario, 1e-3), 30.0 / 3.6)
-    return model, motion(model, 30.0 / 3.6)[0]
-
-
 @pytest.mark.parametrize("trial_functions", ["splines", "sines"])
 @pytest.mark.parametrize(("slope", "difference"), [(0.025, 1e-4), (0.05, 2e-4), (0.05, 1e-3), (0.05, -1e-3)])
 def test_free_wheelset_rolls_where_its_radii_are_equal(slope: float, difference: float, trial_functions: str):
@@ -132,7 +103,7 @@ def test_free_wheelset_rolls_where_its_radii_are_equal(slope: float, difference:
     Off the middle, one rail carries y/b0 more and sinks w = 1 mm times that deeper: the axle rolls and the wheelset
     moves by r0 w/b0^2 = 8e-4 of y. Terms of second order in the cone's slope remain.
     """
-    model, state = free_wheelsets(slope, difference, trial_functions)
+    model, state = rolling(free_wagon(slope, difference, trial_functions))
     u = state.part(0, "vehicles")[DISPLACEMENT][model.ingredients.train.wheelset_dof]
     y = difference / (2.0 * slope)
     shift = state.relative_shift[0]

@@ -16,6 +16,7 @@ from validation.speed.__main__ import CASES as MEASURED
 from validation.speed.accuracy import Error, difference, enough
 from validation.speed.bench import Bench
 from validation.speed.effort import effort
+from validation.speed.features import FEATURES, PLAIN, features
 from validation.speed.figures import draw
 from validation.speed.full_length import STAGES
 from validation.speed.page import page
@@ -243,3 +244,19 @@ def test_page_and_figures_of_stages_scaling_and_accuracy(tmp_path):
 def test_the_eight_car_train_comes_first_in_the_figure():
     found = {"trains": case({"rtf_train8": 2.0, "rtf_train16": 4.4})}
     assert [bar[2] for bar in figures._bars(found)][:2] == [2.0, 4.4]
+
+
+def test_features_are_compared_within_each_round():
+    """A machine half as fast in the second round changes the cost of a step, not by how much more a feature takes."""
+    pace = (1.0, 2.0, 1.0)
+    rounds = {
+        name: [
+            {"real_time_factor": (0.5 + (0.0 if name == PLAIN else 0.1)) * p, "time_step": 2e-4, "others_cores": 0.0}
+            for p in pace
+        ]
+        for name in FEATURES
+    }
+    rows = features(rounds).data["features"]
+    assert FEATURES[0] == PLAIN
+    assert [round(row["us"], 6) for row in rows[:2]] == [100.0, 120.0]
+    assert [round(row["added"], 6) for row in rows[:2]] == [0.0, 20.0]

@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 
 from tiengine.parameters.errors import InputError
+from tiengine.parameters.optional_packages import needed_by
 from tiengine.result_files.channel_table import ChannelTable, channel_table, select_channels
 from tiengine.result_files.output_file import check_output
 
@@ -76,11 +77,9 @@ def _write_csv(result: Reader, path: Path, train: int, channels: Sequence[str]) 
 
 
 def _write_parquet(result: Reader, path: Path, train: int, channels: Sequence[str]) -> str:
-    try:
+    with needed_by(f"output = '{path}'"):
         import pyarrow as pa
         from pyarrow import parquet
-    except ImportError:
-        raise InputError(f"output = '{path}': Parquet needs pyarrow; pip install 'tiengine[parquet]'") from None
     table = channel_table(result, train, channels)
     datasets = [dataset for dataset in table.datasets for _ in range(_width(dataset))]
     fields = [

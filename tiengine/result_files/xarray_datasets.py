@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tiengine.parameters.errors import InputError
+from tiengine.parameters.optional_packages import needed_by
 
 if TYPE_CHECKING:
     import h5py
@@ -89,9 +90,7 @@ def _check_alike(which: str, first: xarray.Dataset, other: xarray.Dataset) -> No
 
 def _packages() -> tuple[Any, Any]:
     """Import xarray and h5netcdf, which are optional dependencies."""
-    try:
+    with needed_by("to_xarray"):
         import h5netcdf
         import xarray
-    except ImportError as error:
-        raise InputError(f"to_xarray: needs {error.name}; pip install 'tiengine[xarray]'") from None
     return xarray, h5netcdf

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiengine.parameters.conventions import SIDES
-from tiengine.parameters.errors import InputError
+from tiengine.parameters.optional_packages import needed_by
 
 __all__ = ["ParquetSink", "Sink", "ZarrSink"]
 
@@ -49,10 +49,8 @@ class ZarrSink:
         Raises:
             InputError: zarr is missing.
         """
-        try:
+        with needed_by("data set"):
             import zarr
-        except ImportError:
-            raise InputError("data set: Zarr needs zarr; pip install 'tiengine[datasets]'") from None
         self._zarr = zarr
         self._root = zarr.open_group(str(path), mode="w", zarr_format=2)  # read by other programs too
         self._path = path
@@ -97,11 +95,9 @@ class ParquetSink:
         Raises:
             InputError: pyarrow is missing.
         """
-        try:
+        with needed_by("data set"):
             import pyarrow
             from pyarrow import parquet
-        except ImportError:
-            raise InputError("data set: Parquet needs pyarrow; pip install 'tiengine[parquet]'") from None
         self._arrow, self._parquet = pyarrow, parquet
         path.mkdir()
         self._path = path

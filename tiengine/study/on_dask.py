@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiengine.parameters.errors import InputError, RunStoppedError
+from tiengine.parameters.optional_packages import needed_by
 from tiengine.result_files.checkpoint import MAKERS
 from tiengine.result_files.journal import atomic_write
 from tiengine.study.folder import Folder
@@ -82,10 +83,8 @@ class Dask:
     @contextmanager
     def _client(self) -> Iterator[Client]:
         """Connect to a scheduler, or start one with its workers."""
-        try:
+        with needed_by("--dask"):
             import distributed
-        except ImportError:
-            raise InputError("--dask: needs dask.distributed; pip install 'tiengine[dask]'") from None
         if self.address == LOCAL:
             from tiengine.simulation.simulate import cores
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tiengine.parameters.errors import InputError, RunStoppedError
+from tiengine.parameters.optional_packages import needed_by
 from tiengine.study.folder import Folder
 from tiengine.study.watch import Watch
 from tiengine.study.work import Work, do_task
@@ -49,10 +50,8 @@ class Slurm:
         Raises:
             InputError: submitit is missing, or there is no such batch system here.
         """
-        try:
+        with needed_by("--slurm"):
             import submitit
-        except ImportError:
-            raise InputError("--slurm: needs submitit; pip install 'tiengine[slurm]'") from None
         folder.allow()
         count = min(self.jobs, len(tasks))
         shares = [_Share(str(folder.path.resolve()), tuple(tasks[i::count]), work) for i in range(count)]

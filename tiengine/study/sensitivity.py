@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
+from tiengine.parameters.optional_packages import needed_by
 from tiengine.study.plan import Plan
 from tiengine.study.table import Table
 
@@ -115,10 +116,8 @@ def sobol_indices(plan: Plan, table: Table, figure: str, blocks: int | None = No
     """
     if plan.sample is None or plan.sample.method != "saltelli":
         raise InputError("Sobol' indices: need sample.method = 'saltelli' in the plan")
-    try:
+    with needed_by("Sobol' indices"):
         from SALib.analyze import sobol
-    except ImportError:
-        raise InputError("Sobol' indices: need SALib; pip install 'tiengine[sensitivity]'") from None
     names = [factor.title for factor in plan.factors]
     width = len(names) + 2
     rows = _of_points(table, figure, plan.sample.size * width).reshape(-1, width)[:blocks]

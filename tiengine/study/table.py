@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError, nearest
+from tiengine.parameters.optional_packages import needed_by
 from tiengine.result_files.export import replacing
 from tiengine.result_files.output_file import check_output
 from tiengine.result_files.reader import COMPLETE
@@ -87,11 +88,9 @@ class Table:
             raise InputError(f"output = '{path}': must end in {', '.join(SUFFIXES)}")
         check_output(path, force=True)
         if path.suffix == ".parquet":
-            try:
+            with needed_by(f"output = '{path}'"):
                 import pyarrow as pa
                 from pyarrow import parquet
-            except ImportError:
-                raise InputError(f"output = '{path}': Parquet needs pyarrow; pip install 'tiengine[parquet]'") from None
             columns = {name: pa.array(_plain(column)) for name, column in self.columns.items()}
             with replacing(path) as temporary:
                 parquet.write_table(pa.table(columns), temporary)

@@ -32,7 +32,7 @@ REACH = 15.0
 TOGETHER = 20
 """Most slabs whose state is sought at once."""
 MOST_STATES = 2000
-"""Of different slabs; each takes a tenth of a second and 10 kB."""
+"""Most different slabs of a run; each takes a tenth of a second and 10 kB."""
 
 
 class SlabsAsTheyAre(Protocol):

@@ -13,6 +13,7 @@ from rich.console import Console
 from validation.speed import findings
 from validation.speed.command import command
 from validation.speed.effort import Effort, effort
+from validation.speed.features import FEATURES, features
 from validation.speed.findings import Findings
 from validation.speed.full_length import full_length
 from validation.speed.length import length
@@ -50,6 +51,7 @@ CASES = {
     "command": Case((), lambda effort, rounds, notify: command(effort)),
     "roofline": Case((), lambda effort, rounds, notify: roofline(effort)),
     "scaling": Case((), lambda effort, rounds, notify: scaling(effort, notify)),
+    "features": Case(FEATURES, lambda effort, rounds, notify: features(rounds)),
     "length": Case((), lambda effort, rounds, notify: length(effort, notify)),
 }
 

@@ -63,6 +63,9 @@ def page(rows: Sequence[Row], cases: Mapping[str, Any], figures: Sequence[str]) 
         found = cases["full_length"]["data"]
         lines += ["", "**Accuracy**: errors of the normal forces over the largest force [%]", "", *_accuracy(found)]
         lines += ["", "**A step of the full-length model** [µs]", "", *_full_length(found["profile"])]
+    if "features" in cases:
+        lines += ["", "**Features**: one car with each in turn, over the same distance", ""]
+        lines += _features(cases["features"]["data"]["features"])
     if "length" in cases:
         lines += ["", "**Distance**, few outputs", "", *_lengths(cases["length"]["data"]["lengths"])]
     pictures = [f"![{name.removesuffix('.png').replace('_', ' ')}]({name})" for name in figures]
@@ -130,6 +133,17 @@ def _roofline(data: Mapping[str, Any]) -> list[str]:
         body.append((_group(group), "whole step of the loop", f"{group['step_us']:.1f}", "", "", "", ""))
         launch = f"a launch, every {group['steps_a_launch']:.1f} steps"
         body.append((_group(group), launch, f"{group['launch_us']:.1f}", "", "", "", ""))
+    return _table(head, body)
+
+
+def _features(data: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Table of the cost of each feature; the first row is the car without any."""
+    head = ("feature", "time step [s]", "µs a step", "added by the feature", "spread of the rounds")
+    body = [
+        (row["words"], f"{row['time_step']:g}", f"{row['us']:.1f}", f"{row['added']:+.1f}" if i else "",
+         f"{row['spread']:.1f}")
+        for i, row in enumerate(data)
+    ]  # fmt: skip
     return _table(head, body)
 
 
