@@ -327,7 +327,7 @@ CASES = (
         source=f"own run at {_FINEST_KNOTS.label}",
         reference=(0.5, 0.3, 3.0),
         rule="at most",
-        why="required bounds of N; Y keeps half of its error, since the waves of torsion and lateral bending left out,"
+        why="required bounds of N; Y keeps 60 % of its error, since the waves of torsion and lateral bending left out,"
         " from 700 Hz on, are not static",
         compute=lambda: _bounded(
             replace(_FINE, functions="sines", density=60 / 36, truncation="static"), _FINEST_KNOTS
