@@ -137,8 +137,12 @@ def test_one_pass_needs_a_shorter_step():
     ("modes", "kmh", "distance"),
     [(8.0, 350.0, 150.0), (12.0, 350.0, 250.0), (13.0, 350.0, 200.0), (10.0, 400.0, 150.0)],
 )
-def test_slow_growth_with_many_sines_is_found(modes, kmh, distance):
-    """Oscillations of the lateral force that grew from 2 N to 4 to 28 kN in a run that ended with "complete"."""
+def test_slow_growth_with_many_sines_is_found(modes, kmh, distance, monkeypatch):
+    """Oscillations of the lateral force that grew from 2 N to 4 to 28 kN in a run that ended with "complete".
+
+    No advice is sought: a trial with so many sines takes a minute.
+    """
+    monkeypatch.setattr("tiengine.engine.time_step._advice", lambda *_: "")
     overrides = (*SINES, f"numerics.modes_per_metre={modes}", f"train.speed_kmh={kmh}")
     with pytest.raises(InputError, match=r"unstable; an oscillation"):
         step_of(*overrides, "numerics.time_step=2e-4", distance=distance)

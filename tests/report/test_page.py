@@ -238,6 +238,9 @@ def test_a_scenario_in_words():
     assert words["Train"] == "CRH380A_v2 with LMA wheels, over 200 m at 350 km/h"
     assert "3 fastenings of the left rail failed (seats 160 to 162, chainage 101.1 to 102.4 m)" in words["Defects"]
     assert "no mortar under 1.6 m² of slab 24" in words["Defects"]
+    assert words["Line"] == "straight and level"
+    small = dict(scenario_words(load_scenario("small_curve")))
+    assert small["Line"] == "curves down to a radius of 350 m, cant up to 100 mm, level"
     gaps = dict(scenario_words(load_scenario("gap", {"track.slab_warps": [{"gradient": -45.0, "slabs": [3, 5]}]})))
     assert "2 fastenings of the right rail hanging by 1 mm (seats 230 to 231" in gaps["Defects"]
     assert "a gap of 0.05 mm under 4.7 m² of slab 21" in gaps["Defects"]

@@ -98,6 +98,14 @@ def test_paths_start_at_the_scenarios_folder(tmp_path: Path):
     assert load_scenario(tomllib.loads(text)).parts.wheel.name == "worn"
 
 
+def test_files_beside_a_built_in_scenario_start_at_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Not in the library, where no user has files."""
+    (tmp_path / "mine.csv").write_text("x,z_v\n" + "".join(f"{x},0\n" for x in range(500)))
+    monkeypatch.chdir(tmp_path)
+    scenario = load_scenario("default", ["irregularity.file=mine.csv"])
+    assert scenario.irregularity.file == str(tmp_path / "mine.csv")
+
+
 def test_parts_as_tables():
     """A table stands alone or starts from a preset; a scenario may bring presets of its own."""
     table = {

@@ -68,3 +68,28 @@ def test_trains_of_an_ensemble_run_on_the_same_line():
     for total in totals:
         assert total.mean() == pytest.approx(totals[0].mean(), rel=1e-3)  # m a_q whatever the friction
         assert total.mean() < -1e4
+
+
+def test_guards_in_a_curve() -> None:
+    """Nothing is said of flanges against the rail at 0.29 g outward; a push of 120 kN at the car lifts inner wheels.
+
+    In the mirrored curve those of the other side lift, at the same places.
+    """
+    rows = [[0.0, 0.0], [0.3, 1.2e5], [10.0, 1.2e5]]
+    found = []
+    for side, push, distance in ((1.0, 0.0, 4.0), (1.0, -1.0, 13.0), (-1.0, 1.0, 13.0)):
+        arc = {"kind": "arc", "length": 300.0, "radius": side * 350.0, "cant_mm": 0.0}
+        running = scenario(
+            track__alignment=(*LINE[:2], arc), train__start=120.0, train__distance=distance, train__speed_kmh=114.0,
+            train__forces=[{"motion": "y", "rows": rows, "scale": push}],
+        )  # fmt: skip
+        with simulate.run(running) as result:
+            events = result.group("events")
+            found.append([[str(value) for value in events[name]] for name in ("kind", "wheelset", "side")])
+            found[-1].append([float(position) for position in events["position"]])
+    assert found[0] == [[], [], [], []]
+    for (kinds, wheelsets, sides, _), inner in zip(found[1:], ("right", "left"), strict=True):
+        assert kinds == ["wheel_lift"] * 4
+        assert sorted(wheelsets) == ["1", "2", "3", "4"]
+        assert set(sides) == {inner}
+    assert found[1][3] == pytest.approx(found[2][3], abs=1e-9)

@@ -7,7 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tiengine.model.from_scenario import ingredients
 from tiengine.parameters.conventions import GRAVITY
+from tiengine.parameters.errors import InputError
+from tiengine.parameters.input_files import load_toml
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation.simulate import run
 from tiengine.vehicle.train import assemble, static_wheel_loads
@@ -31,6 +34,30 @@ def test_a_load_off_the_centre_presses_on_its_side():
     assert loads.sum() == pytest.approx(wagon.mass * GRAVITY, rel=1e-9)
     moment = (loads[:, 1] - loads[:, 0]).sum() * wagon.half_spacing
     assert moment == pytest.approx(LOAD * GRAVITY * OFFSET, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"car.mass": -32000.0}, "car.mass = -32000.0: must be greater than 0 kg"),
+        ({"geometry.wheel_radius": 460.0}, "wheel_radius = 460.0: must be less than or equal to 1.5 m"),
+        ({"geometry.half_wheelbase": 1280.0}, "half_wheelbase = 1280.0: must be less than or equal to 100 m"),
+        ({"secondary.kz": 0.0}, "car: not restrained by springs, mostly in z"),
+    ],
+)
+def test_other_units_are_named(change, message):
+    """Millimetres, forgotten springs: in one line."""
+    keys = {f"train.vehicles.0.{key}": value for key, value in change.items()}
+    with pytest.raises(InputError, match=message):
+        ingredients(load_scenario("smooth", {"train.vehicles": ["Manchester"], **keys}), 2e-4)
+
+
+def test_a_vehicle_that_would_tip_over_is_refused():
+    """The centre of gravity of the wagon's car a metre beside the track's centre."""
+    wagon = load_toml(DATA / "wagon_offset.toml")
+    wagon["body"][0]["y"] = 1.0
+    with pytest.raises(InputError, match=r"wheelset [1-4] left would carry -[\d.]+ kN at rest; all wheels must carry"):
+        ingredients(load_scenario("smooth", {"train.vehicles": [wagon]}), 2e-4)
 
 
 def test_both_side_frames_take_the_torque_of_the_brakes():

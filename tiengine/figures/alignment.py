@@ -83,4 +83,4 @@ def plot_beneath(axes: Axes, line: Alignment, begin: float, end: float) -> None:
     other.grid(visible=False)
     other.set_ylabel("[mm]")
     own, others = axes.get_legend_handles_labels(), other.get_legend_handles_labels()
-    axes.legend(own[0] + others[0], own[1] + others[1], loc="upper left", ncols=2)
+    axes.legend(own[0] + others[0], own[1] + others[1], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)

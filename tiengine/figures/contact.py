@@ -84,7 +84,7 @@ def draw(train: Train) -> Figure:
             title=plain(f"{body.capitalize()}: {drawn[body].names}"),
             ylabel=f"share of {'patches' if two else 'time'}\n[% in {1e3 * BIN:g} mm]",
         )
-    axes[0].legend(loc="upper right")
+    axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=2)
     return figure
 
 

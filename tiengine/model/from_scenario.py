@@ -16,11 +16,13 @@ from tiengine.model.ingredients import Ingredients, SlabDesigns
 from tiengine.model.newmark import Newmark
 from tiengine.model.slabs_at_rest import slabs_at_rest
 from tiengine.parameters.arrays import Reals
+from tiengine.parameters.conventions import SIDES
+from tiengine.parameters.errors import InputError
 from tiengine.scenario.contact_settings import contact_settings
 from tiengine.scenario.scenario import Scenario
 from tiengine.track.defects import FailedFastenings, fastening_factors, fastening_plays
 from tiengine.track.slab_matrices import slab_designs
-from tiengine.vehicle.train import TrainModel, assemble, with_wheel_radii
+from tiengine.vehicle.train import TrainModel, assemble, static_wheel_loads, with_wheel_radii
 
 __all__ = ["ingredients"]
 
@@ -44,6 +46,7 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         effort=asked.effort,
         couplings=parts.couplings,
     )
+    _check_wheel_loads(train)
     moving = scenario.track.base_motion.file is not None
     if scenario.track.line is not None or scenario.wind.speed is not None or asked.forces or moving:
         train = replace(train, K=train.K + train.K_leaning)
@@ -79,6 +82,18 @@ def ingredients(scenario: Scenario, dt: float) -> Ingredients:
         seat_plays=_seat_plays(scenario),
         dead=dead,
     )
+
+
+def _check_wheel_loads(train: TrainModel) -> None:
+    """Refuse vehicles that do not stand on all of their wheels."""
+    loads = static_wheel_loads(train)
+    w, side = np.unravel_index(int(np.argmin(loads)), loads.shape)
+    if loads[w, side] <= 0.0:
+        raise InputError(
+            f"train.vehicles: wheelset {w + 1} {SIDES[side]} would carry {1e-3 * loads[w, side]:.3g} kN at rest; all"
+            " wheels must carry: do the centres of gravity (x, y) lie between them, are masses in kg and stiffnesses in"
+            " N/m?"
+        )
 
 
 def _contacts(scenario: Scenario, train: TrainModel) -> WheelContacts:

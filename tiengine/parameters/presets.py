@@ -18,7 +18,7 @@ from tiengine.parameters.input_files import (
     user_path,
 )
 
-__all__ = ["KINDS", "LONGEST_PATH", "find_preset", "preset_names", "preset_source"]
+__all__ = ["KINDS", "LONGEST_PATH", "find_preset", "library_folder", "preset_names", "preset_source"]
 
 KINDS = (
     "vehicles",

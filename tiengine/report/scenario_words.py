@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tiengine.scenario.ensemble import Ensemble
+from tiengine.track.alignment import CANT_BASE
 
 if TYPE_CHECKING:
     from tiengine.scenario.parts import Parts
@@ -35,6 +36,7 @@ def scenario_words(scenario: Scenario) -> list[tuple[str, str]]:
     rows = [
         ("Train", _train(scenario)),
         ("Track", _track(scenario)),
+        ("Line", _line(scenario)),
         ("Irregularity", _irregularity(scenario)),
         ("Defects", "; ".join(_defects(scenario)) or "none"),
         ("Numerics", _numerics(scenario)),
@@ -87,6 +89,18 @@ def _track(scenario: Scenario) -> str:
         f" {slab.length:g} x {slab.width:g} x {slab.thickness:g} m on a bed of {1e-9 * parts.mortar.stiffness:g} N/mm³"
         f"{', which does not pull' if parts.mortar.no_tension else ''}"
     )
+
+
+def _line(scenario: Scenario) -> str:
+    line = scenario.track.line
+    if line is None:
+        return "straight and level"
+    curvature, cant = float(np.abs(line.curvature).max()), 1e3 * CANT_BASE * float(np.abs(np.sin(line.roll)).max())
+    curves = (
+        f"curves down to a radius of {1.0 / curvature:.4g} m, cant up to {cant:.3g} mm" if curvature else "straight"
+    )
+    gradient = 1e3 * float(np.abs(line.gradient).max())
+    return f"{curves}, {f'gradients up to {gradient:.3g} ‰' if gradient else 'level'}"
 
 
 def _cant(cant: float) -> str:

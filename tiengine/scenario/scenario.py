@@ -22,7 +22,7 @@ from tiengine.parameters.conventions import GRAVITY
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.html_rows import html_rows
 from tiengine.parameters.input_files import load_toml, to_tuples
-from tiengine.parameters.presets import find_preset
+from tiengine.parameters.presets import find_preset, library_folder
 from tiengine.parameters.quantity import Params, PlainName, Source, build
 from tiengine.scenario.ensemble import Ensemble
 from tiengine.scenario.event_policy import Events
@@ -152,7 +152,8 @@ def load_scenario(source: str | Path | dict[str, Any] | Scenario, overrides: Ove
         tables = to_tuples(source)
     else:
         path = find_preset("scenarios", str(source), called="scenario")
-        folder, tables = path.parent, load_toml(path)
+        tables = load_toml(path)
+        folder = None if path.parent == library_folder("scenarios") else path.parent  # a built-in one names no files
         tables.setdefault("name", path.stem)
     tables = absolute_files(apply_overrides(tables, overrides, Scenario), folder)
     scenario = build(Scenario, tables)

@@ -31,8 +31,8 @@ from tiengine.vehicle.connector import (
 
 __all__ = ["Coach", "expand"]
 
-_Span = Annotated[float, Q("m", gt=0)]
-_Height = Annotated[float, Q("m", "above the rail", gt=0)]
+_Span = Annotated[float, Q("m", gt=0, le=100)]
+_Height = Annotated[float, Q("m", "above the rail", gt=0, le=10)]
 _Rates = tuple[Annotated[float, Q("m/s", ge=0)], ...]
 _SIDES = ((-1.0, SIDES[0]), (1.0, SIDES[1]))
 
@@ -52,7 +52,7 @@ class Geometry(Params):
         height_car_cg: Centre of gravity of the car body above the rail.
     """
 
-    wheel_radius: _Span
+    wheel_radius: Annotated[float, Q("m", gt=0, le=1.5)]
     half_bogie_centres: _Span
     half_wheelbase: _Span
     half_span_primary: _Span

@@ -33,9 +33,9 @@ class Vehicle(Params):
     vehicle_class: Annotated[
         VehicleClass | None, Field(description="selects the limits of indices; without it only those of all vehicles")
     ] = None
-    wheel_radius: Annotated[float, Q("m", "r0", gt=0)]
-    half_span_contact: Annotated[float, Q("m", "b0, half distance of the tape circles", gt=0)]
-    length_over_couplers: Annotated[float, Q("m", "default pitch of the vehicles of a train", gt=0)]
+    wheel_radius: Annotated[float, Q("m", "r0", gt=0, le=1.5)]
+    half_span_contact: Annotated[float, Q("m", "b0, half distance of the tape circles", gt=0, le=2)]
+    length_over_couplers: Annotated[float, Q("m", "default pitch of the vehicles of a train", gt=0, le=100)]
     series_springs: SeriesSprings = False
     body: Annotated[tuple[Body, ...], Field(description="tables")]
     spring: Annotated[tuple[Spring, ...], Field(description="tables")] = ()
