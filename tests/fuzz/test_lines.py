@@ -124,8 +124,23 @@ def alignment(random: Random) -> Feature:
     return {"track.alignment": tuple(elements[first:]), "contact.patches": int(pick(random, 1, 1, 2))}
 
 
+def lifting(random: Random) -> Feature:
+    slab, seat = int(LEAD // 5.67), int(LEAD // 0.63)
+    x = float(random.uniform(0.0, 5.0))
+    found: Feature = {"track.mortar_no_tension": random.random() < 0.95}
+    if random.random() < 0.7:
+        found["track.slab_warps"] = ({"gradient": float(random.normal(0.0, 60.0))},)
+    if random.random() < 0.7:
+        void = {"slab": slab, "x": (x, x + float(random.uniform(0.01, 2.0))), "y": (-1.25, 1.25)}
+        found["track.mortar_voids"] = (void | {"gap": float(10.0 ** random.uniform(-6.0, -1.0))},)
+    if random.random() < 0.5:
+        gap = float(10.0 ** random.uniform(-6.0, -2.0))
+        found["track.failed_fastenings"] = ({"seats": (seat, seat + 1), "gap": gap},)
+    return found
+
+
 FEATURES: tuple[Callable[[Random], Feature], ...] = (
-    wheel_shapes, wheel_profiles, rail_shapes, ground, wind, forces, couplings, alignment,
+    wheel_shapes, wheel_profiles, rail_shapes, ground, wind, forces, couplings, alignment, lifting,
 )  # fmt: skip
 
 

@@ -119,7 +119,10 @@ class Scenario(Params):
     @property
     def grading(self) -> Grading:
         """Grading of the splines' knots on this track."""
-        defects = self.track.failed_fastenings or self.track.mortar_voids
+        track = self.track
+        # of factor 1 without a gap they are sound
+        failed = any(row.gap or row.factor != 1.0 for row in track.failed_fastenings)
+        defects = failed or track.slab_warps or any(void.gap or void.factor != 1.0 for void in track.mortar_voids)
         return self.numerics.knots.at_defects() if defects else self.numerics.knots
 
     @cached_property

@@ -18,10 +18,10 @@ __all__ = ["Grading", "graded_knots", "uniform_knots"]
 class Grading(Params):
     """Distance of knots: ``finest`` up to ``near`` from a wheel, then growing with the distance, to ``coarsest``.
 
-    On a track with failed fastenings or voids it grows to ``coarsest_at_defects`` only. There the rails carry what
-    their support does not, within a metre, also far from any wheel: the free end of a slab over a void swings on them.
-    With knots 1 m apart they are too stiff for that, and the next bogie finds the slab in another phase (2.4 % of the
-    peak force).
+    On a track with failed fastenings, voids or warped slabs it grows to ``coarsest_at_defects`` only. There the rails
+    carry what their support does not, within a metre, also far from any wheel: the free end of a slab over a void
+    swings on them. With knots 1 m apart they are too stiff for that, and the next bogie finds the slab in another phase (2.4 %
+    of the peak force).
     """
 
     finest: Annotated[float, Q("m", "between knots near a wheel", ge=0.01, le=2)] = 0.15
@@ -29,7 +29,8 @@ class Grading(Params):
     growth: Annotated[float, Q("-", "of the distance between knots per distance from the wheel", gt=0, le=1)] = 0.2
     coarsest: Annotated[float, Q("m", "between knots far from the wheels", ge=0.01, le=2)] = 1.0
     coarsest_at_defects: Annotated[
-        float, Q("m", "the same on a track with failed fastenings or mortar voids, if smaller", ge=0.01, le=2)
+        float,
+        Q("m", "the same on a track with failed fastenings, mortar voids or warped slabs, if smaller", ge=0.01, le=2),
     ] = 0.5
 
     @model_validator(mode="after")
@@ -39,7 +40,7 @@ class Grading(Params):
         return self
 
     def at_defects(self) -> Grading:
-        """Grading of a track with failed fastenings or voids."""
+        """Grading of a track with failed fastenings, voids or warped slabs."""
         return self.model_copy(update={"coarsest": min(self.coarsest, max(self.coarsest_at_defects, self.finest))})
 
     def spans(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
