@@ -20,8 +20,8 @@ class Grading(Params):
 
     On a track with failed fastenings, voids or warped slabs it grows to ``coarsest_at_defects`` only. There the rails
     carry what their support does not, within a metre, also far from any wheel: the free end of a slab over a void
-    swings on them. With knots 1 m apart they are too stiff for that, and the next bogie finds the slab in another phase (2.4 %
-    of the peak force).
+    swings on them. With knots 1 m apart they are too stiff for that, and the next bogie finds the slab in another
+    phase (2.4 % of the peak force).
     """
 
     finest: Annotated[float, Q("m", "between knots near a wheel", ge=0.01, le=2)] = 0.15
