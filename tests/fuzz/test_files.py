@@ -11,6 +11,7 @@ import pytest
 from hypothesis import strategies as st
 
 from tiengine.contact.profile import Kind, Profile, load_profile
+from tiengine.irregularity.base_motion import BaseMotion, GroundRecord
 from tiengine.irregularity.irregularity import IrregularityParams, make_irregularity
 from tiengine.irregularity.measured_files import LARGEST_CHAINAGE, LARGEST_HEIGHT, read_series
 
@@ -30,6 +31,11 @@ TRACK = "# measured\nmileage [km], vertical_left [mm], vertical_right [mm], alig
     f"{1e-3 * x:.4f}, {np.sin(x):.3f}, {np.cos(x):.3f}, {1e-3 * np.sin(0.5 * x):.6f}, {np.sin(0.3 * x):.3f}" for x in X
 )
 PLAIN = "x,z_v\n" + "\n".join(f"{x:.1f},{1e-3 * np.sin(x):.6f}" for x in X)
+
+
+SHAKEN = "time [s], vertical [m/s^2], lateral [gal]\n" + "\n".join(
+    f"{0.01 * i:.2f}, {np.sin(0.3 * i):.4f}, {20.0 * np.cos(0.2 * i):.3f}" for i in range(60)
+)
 
 
 def text_of(suffix: str, kind: Kind) -> str:
@@ -163,3 +169,22 @@ def test_changed_tracks_under_a_train(tmp_path: Path) -> None:
         return message is not None
 
     on_many(50, mutated_texts(TRACK), check)
+
+
+@EXAMPLES
+def test_changed_acceleration_records(examples: int, tmp_path: Path) -> None:
+    """A changed record of the ground's acceleration is refused with its name, or gives a finite motion."""
+    path = tmp_path / "fuzzed.csv"
+
+    def check(text: str) -> bool:
+        path.write_text(text, encoding="utf-8", errors="surrogatepass", newline="")
+        found: list[GroundRecord] = []
+        message = refused(lambda: found.append(GroundRecord(BaseMotion(file=str(path), taper=0.05))))
+        if message is None:
+            times = np.linspace(-1.0, found[0].duration + 1.0, 50)
+            assert all(np.isfinite(found[0].at(times, derivative)).all() for derivative in range(4))
+        else:
+            assert path.name in message
+        return message is not None
+
+    on_many(examples, mutated_texts(SHAKEN), check)

@@ -148,3 +148,22 @@ def test_a_straight_line_has_no_indices_of_curves():
     ride = GivenRide()
     ride.line = None
     assert not list(curves.wheel_indices(ride, 0))
+
+
+class MixedRide(GivenRide):
+    """The right wheel has a steep flange, the left one, which carries less, a flat one."""
+
+    def flange_angle_of(self, wheelset: int, side: int) -> float | None:
+        return float(np.radians((20.0, 70.0)[side]))
+
+
+def test_nadals_limit_is_that_of_the_wheel_nearest_to_it():
+    """Left Y is -1 kN throughout: only its own limit, 0.06 at 20 degrees and friction 0.3, decides for it."""
+    (index,) = [each for each in curves.wheel_indices(MixedRide(), 0) if each.standard == "Nadal"]
+    steep, flat = (curves.nadal_limit(np.radians(angle), 0.3) for angle in (70.0, 20.0))
+    assert index.place in ("wheelset 1 left", "wheelset 1 right")
+    assert index.limit == pytest.approx(steep if index.place.endswith("right") else flat)
+    (alike,) = [each for each in curves.wheel_indices(GivenRide(), 0) if each.standard == "Nadal"]
+    gaps = {"wheelset 1 right": alike.value - steep, "wheelset 1 left": 1e3 / STATIC - flat}
+    assert index.place == max(gaps, key=lambda place: gaps[place])
+    assert index.value - index.limit == pytest.approx(max(gaps.values()), rel=0.1)

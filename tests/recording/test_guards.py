@@ -30,8 +30,8 @@ def guard() -> Guard:
     return guard_of(Events())
 
 
-def guard_of(policy: Events, track_end: float = np.inf, steps: int = 1) -> Guard:
-    model = model_of("smooth", dt=STEP)
+def guard_of(policy: Events, track_end: float = np.inf, steps: int = 1, overrides: tuple[str, ...] = ()) -> Guard:
+    model = model_of("smooth", *overrides, dt=STEP)
     state = state_at_rest(model)
     state.enter(0, 0)
     state.normal_force[...] = 7e4
@@ -124,6 +124,19 @@ def test_a_flight_that_ends_in_time_is_no_event(guard: Guard):
         for check in range(1 if load else 40):
             guard.check(5 * (check + 1), 10.0)
     assert guard.take() == {}
+
+
+def test_each_wheel_climbs_on_its_own_flange():
+    """S1002 on the right of wheelset 2: between its limit and LMA's, only wheels of the lower limit climb."""
+    guard = guard_of(Events(), overrides=("train.wheel_profiles=[{wheelsets=[2], side='right', profile='S1002'}]",))
+    contacts = guard.stepper.ingredients.contacts
+    assert contacts is not None
+    lma, s1002 = map(climbing_shift, contacts.tables)
+    guard.state.relative_shift[0, 1, :] = 0.5 * (lma + s1002)
+    guard.check(5, 10.0)
+    event = only(guard)
+    assert (event.kind, event.wheelset, event.side) == ("flange_climb", 2, "left" if lma < s1002 else "right")
+    assert f"beyond {1e3 * min(lma, s1002):.1f} mm" in event.words
 
 
 def test_climbing_and_derailing(guard: Guard):

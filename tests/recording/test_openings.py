@@ -12,6 +12,7 @@ import pytest
 from tiengine import result as results
 from tiengine.indices.key_figures import key_figures
 from tiengine.indices.train_record import Train
+from tiengine.model.from_scenario import ingredients
 from tiengine.parameters.errors import InputError, RunStoppedError
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation import simulate
@@ -92,3 +93,40 @@ def test_a_run_over_gaps_goes_on_with_the_same_bits(path: Path, tmp_path: Path) 
 def test_a_gauge_in_a_gap_needs_a_bed_that_lets_go() -> None:
     with pytest.raises(InputError, match=r"gauges\[0\]\.on = 'gap': needs a bed that transmits no tension"):
         load_scenario("default", {"gauges": CASE["gauges"], "train.distance": 40.0, "train.start": 60.0})
+
+
+def test_a_hanging_seat_carries_by_its_law() -> None:
+    """Force of a hanging seat, as recorded, from the motion of rail and slab there, seats being points.
+
+    Its spring holds e - k g beyond its play, e = k (w - w_P) + k u at rest, and damping counts by the same share.
+    Within 1 % of the largest: forces are those of the last pass, motions those after it.
+    """
+    where = {"chainage": (HANGING + 0.5) * 0.63}
+    points = {"fastening.length": 0.0, "fastening.baseplate_length": 0.0, "fastening.baseplate_width": 0.0}
+    gauges = [
+        {"name": "seat", "on": "fastening", "side": "left", **where},
+        {"name": "rail", "on": "rail", "side": "left", **where},
+        {"name": "slab", "on": "slab", "y": -0.7465, **where},
+    ]
+    more = {"train.distance": 14.0, "train.start": 68.0, "gauges": gauges}
+    scenario = load_scenario("default", CASE | more | {f"track.{key}": value for key, value in points.items()})
+    with simulate.run(scenario) as result:
+        group = result["trains/000/gauges"]
+        force = group["seat/vertical_force"][:]
+        time = group["seat/time"][:]
+        motion = {}
+        for name in ("rail", "slab"):
+            here = np.isin(group[f"{name}/time"][:], time)
+            motion[name] = [group[f"{name}/{kind}"][here, 1] for kind in ("displacement", "velocity")]
+    (w, v), (w_P, v_P) = motion["rail"], motion["slab"]
+    g = ingredients(scenario, 2e-4)
+    slab, seat = divmod(HANGING, g.slab.fastenings)
+    rest = g.dead.seat_force[g.dead.of(slab), seat, 0]
+    k, c = g.fastening.vertical_stiffness, g.fastening.vertical_damping
+    e = k * w - (k * w_P + c * v_P) + rest
+    share = np.maximum(np.abs(e) - k * 2e-4, 0.0) / np.abs(e)
+    law = share * (k * (w - w_P) + c * (v - v_P) + rest)
+    assert 300.0 < rest < 0.5 * k * 2e-4  # the weight of about a seat pitch of rail, and the gap is open
+    assert force.max() > 5e3
+    assert np.abs(force - law).max() < 0.01 * force.max()
+    assert np.count_nonzero(force == 0.0) > 0.3 * len(force)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tiengine.engine.state import DISPLACEMENT
 from tiengine.irregularity.base_motion import GroundRecord
 from tiengine.parameters.errors import RunStoppedError
 from tiengine.scenario.scenario import load_scenario
 from tiengine.simulation import simulate
+from tiengine.simulation.tasks import plan
+from tiengine.simulation.time_loop import Run
 
 from .test_resume import assert_same, stopped_after
 
@@ -55,6 +58,45 @@ def test_wheels_carry_weight_less_what_accelerates(record):
         assert np.abs(inertia).max() > 1e4
         carried = wheel[name].sum(axis=(1, 2))
         assert np.abs(carried - weight + inertia).max() < 20.0, name
+
+
+def test_rails_and_slabs_weigh_on_their_seats_and_beds(record):
+    """Far from the train a seat bears -rho A d a of its rails, a slab sinks by -(its mass and that of both rails) a/k.
+
+    Less the same on ground at rest. The ground moves slowly
+    against rails on seats (200 Hz and more): to 2 % of the largest vertically, laterally (60 Hz) to 5 %.
+    """
+    end = {
+        "motion": {"start": 0.0},
+        "train__distance": 29.0,
+        "train__start": 60.0,
+        "irregularity__spectrum": "none",
+    }  # 0.298 s: at the peak
+    end |= {"numerics__window": 60.0}  # a seat 10 m from the train and from the window's end
+    states = []
+    for s in (scenario(record, **end), scenario(record, **end | {"motion": {"start": 50.0}})):
+        trip = Run.begin(plan(s)[0])
+        for _ in trip.blocks():
+            pass
+        state = trip.stepper.state
+        states.append((state.seat_forces[0].copy(), state.slab_motion(DISPLACEMENT)[0].copy(), state.first_slab))
+    forces, slabs = states[0][0] - states[1][0], states[0][1] - states[1][1]
+    parts = trip.task.scenario.parts
+    time = trip.done * trip.recorder.dt
+    down, aside = GroundRecord(scenario(record, **end).track.base_motion).at(np.array([time]), 2)[0]
+    rail = parts.rail.mass_per_length * parts.slab.fastening_pitch
+    assert abs(down) > 0.5
+    assert abs(aside) > 0.5
+    np.testing.assert_allclose(forces[:, 0, 15], -rail * down, rtol=0.02)
+    np.testing.assert_allclose(forces[:, 1, 15], -rail * aside, rtol=0.05)
+    slab = slabs[(states[0][2] + 1) % len(slabs)]
+    area = parts.slab.length * parts.slab.width
+    loaded = parts.slab.mass + 2.0 * rail * parts.slab.fastenings
+    for found, a, k in (
+        (slab[:-2:3].mean(), down, parts.mortar.stiffness),
+        (slab[-2], aside, parts.mortar.lateral_stiffness),
+    ):
+        assert found == pytest.approx(-loaded * a / (k * area), rel=0.05)
 
 
 def test_a_resumed_run_has_the_same_bits(record, tmp_path):

@@ -142,6 +142,12 @@ def test_what_the_full_length_model_has_not_is_refused(override, said):
         run_full_length(load_scenario("paper", [*SHORT, override]), FullLength(60.0))
 
 
+def test_displaced_ground_is_refused():
+    ground = "track.ground=[{kind='cosine', at=40, length=10, depth=0.01}]"
+    with pytest.raises(InputError, match=r"track\.ground: must be left out in the full-length model"):
+        run_full_length(load_scenario("default", [ground]), FullLength(60.0))
+
+
 @pytest.mark.slow
 def test_wheels_and_rails_that_differ_act_alike():
     """Radii, profiles and rails of their own in both models: 1 % of the peak, as for rails that are alike."""

@@ -22,6 +22,7 @@ ACCELERATIONS = {
 UNITS = {"time": {"s": 1.0, "ms": 1e-3}, "vertical": ACCELERATIONS, "lateral": ACCELERATIONS}
 FEWEST = 4  # rows, for a spline
 LARGEST = 50.0  # m/s^2: twice the largest that has been recorded
+LONGEST, SHORTEST_STEP = 1e4, 1e-5  # s: of a record, between two rows
 
 
 def read_acceleration(path: str, key: str) -> Reals:
@@ -53,8 +54,10 @@ def read_acceleration(path: str, key: str) -> Reals:
             record[i, target] = factor * float(values[index] or 0.0)
         if np.abs(record[i, 1:]).max() > LARGEST:
             raise text.error(number, f"acceleration above {LARGEST:g} m/s^2: are its units right?")
-        if i and not record[i, 0] > record[i - 1, 0]:
-            raise text.error(number, "the time must rise from row to row")
+        if i and not record[i, 0] >= record[i - 1, 0] + SHORTEST_STEP:
+            raise text.error(number, f"the time must rise from row to row, by {SHORTEST_STEP:g} s at least")
+        if record[i, 0] - record[0, 0] > LONGEST:
+            raise text.error(number, f"time: must be at most {LONGEST:g} s after the first row")
     record[:, 0] -= record[0, 0]
     return record
 

@@ -56,14 +56,14 @@ class Ground(Params):
         needed = ("file",) if of_file else ("at", "length")
         for key in needed:
             if getattr(self, key) is None:
-                raise InputError(f"track.ground.{key}: missing; a {self.kind} needs {', '.join(needed)}")
+                raise InputError(f"track.ground.{key}: missing; kind = '{self.kind}' needs {', '.join(needed)}")
         if not of_file and self.depth == 0.0 and self.lateral == 0.0:
-            raise InputError(f"track.ground.depth: missing; a {self.kind} needs depth, lateral or both")
+            raise InputError(f"track.ground.depth: missing; kind = '{self.kind}' needs depth, lateral or both")
         own = ("taper", "scale", "file") if of_file else ("at", "length", "depth", "lateral")
         for key in sorted(self.model_fields_set - {"kind", *own}):
             if getattr(self, key) != type(self).model_fields[key].default:
                 raise InputError(
-                    f"track.ground.{key} = {getattr(self, key)!r}: must be left out; a {self.kind} has no {key}"
+                    f"track.ground.{key} = {getattr(self, key)!r}: must be left out with kind = '{self.kind}'"
                 )
         return self
 
