@@ -187,11 +187,19 @@ class BlowingWind(Wind):
     aerodynamics: Annotated[Part, Field(description="part: coefficients of the car bodies")] = "EMU_lead"
 
 
+def _not_a_bool(value: object) -> object:
+    """Refuse true and false, which equal 1 and 0."""
+    if isinstance(value, bool):
+        raise ValueError("must be 1 or 2")
+    return value
+
+
 class Contact(Params):
     """Wheel-rail contact."""
 
     patches: Annotated[
         Literal[1, 2],
+        BeforeValidator(_not_a_bool),
         Field(description="contact patches a wheel can have; 2 lets tread and flange carry load at the same time"),
     ] = 1
 
