@@ -12,7 +12,8 @@ from tiengine.track.plate_shapes import WXX, WYY, element_dofs, tabulate_shapes
 from tiengine.track.slab import Slab
 from tiengine.track.slab_matrices import slab_matrices
 from tiengine.track.slab_moments import nodes
-from tiengine.track.slab_warp import SlabWarp, curvature_of, warp_load
+from tiengine.track.slab_warp import SlabWarp, curvature_of
+from tiengine.track.warp_load import warp_load
 
 CURVATURE = 90.0 * 1e-5  # 1/m
 

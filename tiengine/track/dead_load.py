@@ -28,10 +28,10 @@ from tiengine.track.rail import Rail
 from tiengine.track.rail_operators import RailOperators
 from tiengine.track.slab import Slab
 from tiengine.track.slab_matrices import SlabMatrices, bed_points
-from tiengine.track.slab_warp import warp_load
 from tiengine.track.splines import Splines
 from tiengine.track.steady_track import SeatsInWindow, track_stiffness, vertical_stretch
 from tiengine.track.unilateral import PushingSprings, at_rest
+from tiengine.track.warp_load import warp_load
 
 __all__ = ["RestingSlab", "RestingTrack", "TrackParts", "resting_track"]
 

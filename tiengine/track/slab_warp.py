@@ -1,10 +1,6 @@
-r"""Slabs that a temperature gradient warps (MODEL §14).
+"""Slabs that a temperature gradient warps: parameters and curvature (MODEL §14).
 
 A gradient T' from the upper to the lower side of a slab that is free to move bends it by alpha T' in both directions.
-As a load on its plate, with the curvatures' shapes B and the rigidity D_0,
-
-    f = alpha T' D_0 (1 + nu) int (N_xx + N_yy) dA
-
 The upper side warmer, the middle rises and the corners sink; a colder upper side lifts the corners.
 """
 
@@ -13,17 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
-from tiengine.parameters.arrays import Reals
 from tiengine.parameters.errors import InputError
 from tiengine.parameters.quantity import Params, Q
-from tiengine.track.mortar import GAUSS
-from tiengine.track.plate_shapes import WXX, WYY, element_dofs, tabulate_shapes
-from tiengine.track.slab import Slab
 
-__all__ = ["SlabWarp", "check_slab_warps", "curvature_of", "warp_load"]
+__all__ = ["SlabWarp", "check_slab_warps", "curvature_of"]
 
 SlabIndex = Annotated[int, Field(ge=0)]
 
@@ -55,21 +46,6 @@ def curvature_of(warps: Sequence[SlabWarp], slab: int) -> float:
     return sum(
         warp.expansion * warp.gradient for warp in warps if warp.slabs is None or warp.slabs[0] <= slab <= warp.slabs[1]
     )
-
-
-def warp_load(slab: Slab) -> Reals:
-    """Load on a plate's coordinates per unit of curvature [N m, N m^2], shape (plate's DOFs,).
-
-    Args:
-        slab: The slab with its mesh.
-    """
-    node, weight = np.polynomial.legendre.leggauss(GAUSS)
-    points = np.stack(np.meshgrid(node, node, indexing="ij"), axis=-1).reshape(-1, 2)
-    area = np.outer(weight, weight).ravel() * slab.length * slab.width / (4.0 * slab.elements_x * slab.elements_y)
-    table = tabulate_shapes(slab, points)
-    of_element = slab.rigidity * (1.0 + slab.nu) * (area @ (table[:, WXX] + table[:, WYY]))
-    index = element_dofs(slab)
-    return np.asarray(np.bincount(index.ravel(), np.tile(of_element, len(index)), slab.plate_dofs), np.float64)
 
 
 def check_slab_warps(warps: Sequence[SlabWarp], last_slab: int) -> None:

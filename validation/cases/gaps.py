@@ -21,7 +21,7 @@ from tiengine.track.dead_load import RestingSlab, TrackParts, resting_track
 from tiengine.track.slab import Slab
 from tiengine.track.slab_matrices import SlabMatrices, slab_matrices
 from tiengine.track.slab_moments import nodes
-from tiengine.track.slab_warp import warp_load
+from tiengine.track.warp_load import warp_load
 from validation.frame.case import Case
 
 __all__ = ["CASES"]
