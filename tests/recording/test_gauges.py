@@ -10,9 +10,10 @@ import pytest
 from tiengine.engine.sine_state import SineState
 from tiengine.kernels import layout as at
 from tiengine.parameters.errors import InputError
-from tiengine.recording.gauge_samples import RailPlace, SlabPlace
+from tiengine.recording.gauge_samples import GaugeSamples, RailPlace, SlabPlace
 from tiengine.scenario.gauges import nearest_seat, slab_under
 from tiengine.scenario.scenario import load_scenario, to_toml
+from tiengine.simulation import simulate
 
 from ..models import paper_model
 
@@ -136,3 +137,33 @@ def test_a_place_of_a_slab_moves_with_its_plate_and_its_rigid_motion():
     assert place.read(chainage + 1e-6, 90.0, 0.0) is None  # behind the window, still in memory
     state.first_slab = 5
     assert place.read(chainage - 10.0, 90.0, 0.0) is None
+
+
+def test_only_steps_with_the_window_over_a_gauge_end_a_launch(monkeypatch: pytest.MonkeyPatch):
+    """A gauge that is left and two that are reached have the samples that asking after every step gives."""
+    gauges = (
+        {"name": "left", "on": "fastening", "chainage": 14.5, "side": "right"},
+        {"name": "rail", "on": "rail", "chainage": 52.0, "side": "left"},
+        {"name": "slab", "on": "slab", "chainage": 50.0, "y": 0.0},
+    )
+    scenario = load_scenario("default", {"train.distance": 8.0, "train.start": 30.0, "gauges": list(gauges)})
+    found, asked = [], []
+    watch = GaugeSamples.watch
+
+    def counted(self: GaugeSamples) -> None:
+        asked[-1] += 1
+        watch(self)
+
+    monkeypatch.setattr(GaugeSamples, "watch", counted)
+    for sparing in (True, False):
+        asked.append(0)
+        if not sparing:
+            monkeypatch.setattr(GaugeSamples, "due", lambda self, plan: plan.wheel >= 0)
+        with simulate.run(scenario) as result:
+            groups = {gauge["name"]: result.group(f"gauges/{gauge['name']}") for gauge in gauges}
+            found.append({name: {key: np.array(group[key]) for key in group} for name, group in groups.items()})
+    for name, group in found[0].items():
+        assert len(group["time"]) > 0
+        for channel, values in group.items():
+            np.testing.assert_array_equal(values, found[1][name][channel])
+    assert asked[0] < 0.8 * asked[1]

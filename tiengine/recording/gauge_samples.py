@@ -18,6 +18,7 @@ import numpy as np
 
 from tiengine.engine.state import ACCELERATION, DISPLACEMENT, VELOCITY, State
 from tiengine.engine.stepper import Plan, Stepper
+from tiengine.kernels import layout as at
 from tiengine.model.ingredients import Ingredients
 from tiengine.parameters.arrays import Flags, Reals
 from tiengine.parameters.conventions import SIDES
@@ -33,6 +34,9 @@ from tiengine.track.slab_moments import bed_places
 __all__ = ["GaugeSamples", "gauge_samples"]
 
 KINDS = (DISPLACEMENT, VELOCITY, ACCELERATION)
+
+NEAR = 1.0
+"""Margin of the window within which a gauge is asked [m]: it may stand for a fastening half a pitch away."""
 
 
 class Place(Protocol):
@@ -181,12 +185,14 @@ class GaugeSamples:
     Attributes:
         stepper: Is watched.
         place: Where it is.
+        chainage: Of the gauge [m].
         channels: Names of the quantities that are read there.
         empty: No samples, shape (0, channels, B, ...).
     """
 
     stepper: Stepper
     place: Place
+    chainage: float
     channels: tuple[str, ...]
     empty: Reals
     _steps: list[int] = field(default_factory=list)
@@ -198,8 +204,11 @@ class GaugeSamples:
         return "gauges"
 
     def due(self, plan: Plan) -> Flags:
-        """Steps that sample the wheels."""
-        return plan.wheel >= 0
+        """Steps that sample the wheels while the window is over the gauge, or nearly so."""
+        X = self.stepper.chunk.clock[plan.step, at.POSITION]
+        passed = self.chainage - X
+        over = (passed > -NEAR) & (passed < self.stepper.ingredients.length + NEAR)
+        return np.asarray((plan.wheel >= 0) & over, np.bool_)
 
     def watch(self) -> None:
         """Read, if the step samples the wheels."""
@@ -245,12 +254,12 @@ def gauge_samples(gauge: Gauge, stepper: Stepper) -> GaugeSamples:
     if gauge.on == "fastening":
         seat = nearest_seat(gauge.chainage, ingredients.slab)
         place: Place = SeatPlace(state, seat, SIDES.index(gauge.side or "left"), watched_seats(ingredients))
-        return GaugeSamples(stepper, place, tuple(GAUGE_FORCE), np.empty((0, 2, trains)))
+        return GaugeSamples(stepper, place, gauge.chainage, tuple(GAUGE_FORCE), np.empty((0, 2, trains)))
     if gauge.on == "gap":
         place = GapPlace(stepper, gauge.chainage, gauge.y or 0.0)
-        return GaugeSamples(stepper, place, tuple(GAUGE_OPENING), np.empty((0, 1, trains)))
+        return GaugeSamples(stepper, place, gauge.chainage, tuple(GAUGE_OPENING), np.empty((0, 1, trains)))
     if gauge.on == "rail":
         place = RailPlace(state, ingredients.length, gauge.chainage, SIDES.index(gauge.side or "left"))
     else:
         place = SlabPlace(state, ingredients, gauge.chainage, gauge.y or 0.0)
-    return GaugeSamples(stepper, place, tuple(GAUGE_MOTION), np.empty((0, 3, trains, 2)))
+    return GaugeSamples(stepper, place, gauge.chainage, tuple(GAUGE_MOTION), np.empty((0, 3, trains, 2)))
